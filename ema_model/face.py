@@ -32,17 +32,17 @@ from ema_model.effects import find
 from ema_model.errors import InputError, quoted
 from ema_model.faults import vector
 from ema_model.identification import run as identification
-from ema_model.identification.objective import Objective
 from ema_model.identification.run import ROBUST, Identification, Progress
+from ema_model.identification.search import Objective
 from ema_model.recordings import Measurement
-from ema_model.recordings.health.card import Health, health_of
+from ema_model.recordings.health import Health, health_of
+from ema_model.recordings.measurement import Sensors
 from ema_model.recordings.recording_set import long_enough
 from ema_model.simulation import plant
 from ema_model.simulation.run import Run
-from ema_model.simulation.sensors import Sensors
-from ema_model.tracking import order
+from ema_model.tracking import flights as flights_tracking
 from ema_model.tracking import track as tracking
-from ema_model.tracking.identify import identified
+from ema_model.tracking.flights import identified
 from ema_model.tracking.result import Tracked
 from ema_model.units.compare import compare_units as compared_units
 from ema_model.units.result import UnitsCompared
@@ -388,9 +388,13 @@ def track(
     """
     actuator = actuator or load_actuator()
     tracking.check_thresholds(thresholds or {})
-    several = order.flights_in(Path(of)) if isinstance(of, str | os.PathLike) and Path(of).is_dir() else _several(of)
-    order.check_order([Path(one) for one in several if not isinstance(one, Measurement)])
-    order.check_enough(several, "em.track")
+    several = (
+        flights_tracking.flights_in(Path(of))
+        if isinstance(of, str | os.PathLike) and Path(of).is_dir()
+        else _several(of)
+    )
+    flights_tracking.check_order([Path(one) for one in several if not isinstance(one, Measurement)])
+    flights_tracking.check_enough(several, "em.track")
     flights = []
     for number, flight in _long_enough(several, actuator):
         if on_progress is not None:

@@ -29,9 +29,9 @@ threading.Thread(target=ask, daemon=True).start()
 """,
     "compiler": """
 import os
-from ema_model.simulation import precompile
+from ema_model.simulation import compiled
 os.cpu_count = lambda: 2
-precompile.compile_ahead([(precompile.find_stack("reduced", ["dead_time"]), "traces")], urgent=False)
+compiled.compile_ahead([(compiled.find_stack("reduced", ["dead_time"]), "traces")], urgent=False)
 """,
 }
 

@@ -17,9 +17,7 @@ from ema_model.actuator.steps import LONGEST_S, SHORTEST_S, reader_step
 from ema_model.actuator.unread import unread
 from ema_model.errors import InputError, did_you_mean, quoted
 from ema_model.faults import vector
-from ema_model.files.limits import TEXT_BYTES
-from ema_model.files.opened import open_user_file
-from ema_model.files.shipped import shipped_folder
+from ema_model.files.opened import TEXT_BYTES, open_user_file, shipped_folder
 from ema_model.files.written import toml_of
 from ema_model.quantities.axes import KINDS as AXIS_KINDS
 from ema_model.quantities.axes import Axes

@@ -17,7 +17,7 @@ from ema_model.actuator.naming import on_axes
 from ema_model.actuator.parameters import SECTIONS, default_of, facts_of, numbers
 from ema_model.actuator.reference import as_spelt, tables_of
 from ema_model.errors import InputError, quoted
-from ema_model.files.limits import TEXT_BYTES
+from ema_model.files.opened import TEXT_BYTES
 from ema_model.files.written import change_file, inline, toml_of, toml_text
 from ema_model.quantities.axes import Axes
 

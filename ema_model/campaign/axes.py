@@ -27,10 +27,10 @@ from ema_model.faults import vector
 from ema_model.files.opened import listed, open_user_file
 from ema_model.quantities.numbers import as_number
 from ema_model.recordings import Measurement, find_side_file, read
+from ema_model.recordings.measurement import Sensors
 from ema_model.recordings.recording_set import check_held_out
 from ema_model.simulation.plant import simulate
 from ema_model.simulation.run import Run
-from ema_model.simulation.sensors import Sensors
 
 # --- what is drawn at random for a task, each from its seed alone: plants, faults, effects, loads ---------------------
 

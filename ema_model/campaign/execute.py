@@ -83,7 +83,7 @@ def prepare() -> None:
     import numba
 
     from ema_model.campaign.one_compiler import share_kernels
-    from ema_model.simulation.one_stack import always_library
+    from ema_model.simulation.compiled import always_library
 
     numba.set_num_threads(1)  # of this thread; where numba was there before
     always_library()

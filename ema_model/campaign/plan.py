@@ -18,9 +18,7 @@ from ema_model.campaign.axes import AXES, MOST_TASKS, USUAL, Choice, check_count
 from ema_model.campaign.kinds import KINDS
 from ema_model.campaign.task import Excitation, File, Recorded, Simulated, Task
 from ema_model.errors import InputError, quoted
-from ema_model.files.limits import TEXT_BYTES
-from ema_model.files.opened import listed, open_user_file
-from ema_model.files.shipped import shipped_folder
+from ema_model.files.opened import TEXT_BYTES, listed, open_user_file, shipped_folder
 from ema_model.files.written import inline, toml_of, toml_text
 
 # --- a plan's text: read over that of the plan that it is like, its entries checked, and written as one file ----------

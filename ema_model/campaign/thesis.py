@@ -17,7 +17,7 @@ from ema_model.actuator import Actuator
 from ema_model.campaign.store import Store
 from ema_model.commands import command
 from ema_model.faults import HEALTHY, NAMES, performance_coefficient, vector
-from ema_model.files.shipped import shipped_folder
+from ema_model.files.opened import shipped_folder
 from ema_model.identification.run import ROBUST
 from ema_model.recordings import Measurement
 from ema_model.simulation.plant import simulate

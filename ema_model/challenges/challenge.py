@@ -18,9 +18,16 @@ from pathlib import Path
 from typing import Any
 
 from ema_model.errors import InputError, quoted
-from ema_model.files.limits import CHALLENGE_BYTES, megabytes
-from ema_model.files.opened import Damaged, Refused, check_user_file, opened_zip, shown
-from ema_model.files.shipped import shipped_folder
+from ema_model.files.opened import (
+    CHALLENGE_BYTES,
+    Damaged,
+    Refused,
+    check_user_file,
+    megabytes,
+    opened_zip,
+    shipped_folder,
+    shown,
+)
 from ema_model.files.written import whole_file
 
 # --- a challenge as one file to hand on -------------------------------------------------------------------------------

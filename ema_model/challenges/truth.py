@@ -28,8 +28,8 @@ from ema_model.estimation import default_free
 from ema_model.faults import vector
 from ema_model.files.opened import shown
 from ema_model.recordings import Measurement
+from ema_model.recordings.measurement import Sensors
 from ema_model.simulation.run import Effects, Run, simulate_reference
-from ema_model.simulation.sensors import Sensors
 
 SENSORS = Sensors(current_noise_A=0.45, encoder_bits=12)
 

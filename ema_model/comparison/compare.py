@@ -11,9 +11,9 @@ from numpy.typing import ArrayLike, NDArray
 from ema_model.actuator import Actuator, load_actuator
 from ema_model.actuator.all_is_read import check_represents
 from ema_model.actuator.naming import path_inside
-from ema_model.comparison.assemble import residuals_of
 from ema_model.comparison.free_simulation import Simulated, in_open_loop, is_by_motion, scored
 from ema_model.comparison.loop_lag import other_controller
+from ema_model.comparison.residuals import residuals_of
 from ema_model.comparison.result import Compared, Comparison, SignalError
 from ema_model.comparison.verdict import judge, judged, silence
 from ema_model.effects import find
@@ -30,11 +30,11 @@ from ema_model.models.measured_motion import evaluation_stretches, fit_stretches
 from ema_model.quantities.numbers import check_number
 from ema_model.recordings import SIGNALS as SIGNAL_KINDS
 from ema_model.recordings import Measurement
-from ema_model.recordings.health.card import health_of
+from ema_model.recordings.health import health_of
 from ema_model.recordings.read import check_same_actuator, prepared
 from ema_model.recordings.recording_set import check_held_out
 from ema_model.recordings.side_file import stated
-from ema_model.simulation.one_stack import compile_behind
+from ema_model.simulation.compiled import compile_behind
 
 Array = NDArray[np.float64]
 Progress = Callable[[str], None]

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from ema_model.comparison.free_simulation import Simulated
     from ema_model.estimation.calibrate import Calibration
     from ema_model.recordings import Measurement
-    from ema_model.recordings.health.card import Health
+    from ema_model.recordings.health import Health
 
 Array = NDArray[np.float64]
 

@@ -16,7 +16,7 @@ from ema_model.estimation import Calibrated, Calibration
 from ema_model.quantities.axes import Axes
 from ema_model.quantities.numbers import IntervalJson
 from ema_model.quantities.signals import SIGNALS
-from ema_model.recordings.health.card import HealthJson
+from ema_model.recordings.health import HealthJson
 
 _Value = TypeVar("_Value")
 

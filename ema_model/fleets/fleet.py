@@ -21,8 +21,8 @@ from ema_model.errors import InputError
 from ema_model.files.opened import shown
 from ema_model.files.written import whole_file
 from ema_model.recordings import Measurement, write_measurement
+from ema_model.recordings.measurement import Sensors
 from ema_model.simulation.run import Run, simulate_reference
-from ema_model.simulation.sensors import Sensors
 from ema_model.units.block import linearised, pooled, unit_of
 
 # --- how well the recordings of one unit tell each of its parameters, and which are only known together ---------------

@@ -15,14 +15,12 @@ from ema_model import faults
 from ema_model.actuator import Actuator
 from ema_model.errors import InputError, quoted
 from ema_model.identification.fit import FAULTS, LONGER_STEPS_S, CorrectedError, Setting, refine, refine_best, setting
-from ema_model.identification.objective import Objective
 from ema_model.identification.optimisers import OPTIMISERS, Optimiser, create
-from ema_model.identification.search import search
+from ema_model.identification.search import Objective, search
 from ema_model.identification.uncertainty import Uncertainty, uncertainty
 from ema_model.physics.rows import LANES
 from ema_model.quantities.numbers import as_number, check_seed
-from ema_model.simulation.one_stack import stack_at_hand
-from ema_model.simulation.precompile import compile_ahead, compile_here, wait_for
+from ema_model.simulation.compiled import compile_ahead, compile_here, stack_at_hand, wait_for
 from ema_model.stacks import Stack
 from ema_model.text import InWords
 

@@ -1,30 +1,305 @@
-"""How sure an identification is: intervals, a joint test of health, and what the data cannot separate.
-
-Everything is linearised at the best fit, in which the base parameters, the starts and unrecorded loads moved with
-k.  The covariance is the sandwich H⁻¹ M H⁻¹: H from the weighted derivatives and the tolerances' prior, M from what
-the errors really are — the recordings' white noise, the tolerances, and the twins' deviations, which last.  A few twins
-tell their own spread roughly: what rests on it is widened as Student's t is beyond the normal distribution.
-"""
+"""How sure an identification is: whether the model suffices, intervals, and which run would tell more."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import chdtri, stdtrit
+from scipy.special import chdtri, i0e, stdtrit
 
 from ema_model import faults
+from ema_model.actuator.naming import on_axes
+from ema_model.commands import command
+from ema_model.errors import InputError
 from ema_model.estimation.calibrate import driven_to_bound
-from ema_model.estimation.feldman_cousins import above_zero, length_of_vector
+from ema_model.estimation.floor import CORRELATED_S, Floor, repeats_of, silent
+from ema_model.estimation.problem import Problem
 from ema_model.estimation.unknowns import ECCENTRICITY, K_SIGMA, polar, to_vector
-from ema_model.identification.adequacy import Adequacy, adequacy
-from ema_model.identification.fit import FAULTS, Fitted
-from ema_model.identification.model_bias import TWINS
-from ema_model.identification.next_experiment import Suggestion, separating
+from ema_model.identification.fit import FAULTS, TWINS, Fitted
 from ema_model.identification.search import logged_apart
+from ema_model.models import ClosedLoop
 from ema_model.quantities.numbers import HALF_90
+from ema_model.quantities.titles import in_sentence
+from ema_model.recordings import SIGNALS as SIGNAL_NAMES
+from ema_model.simulation.run import Run, simulate_monitor
+
+# --- whether the model, with the best k and all that may move, leaves no more than noise and its own floor ------------
+# Two kinds of test.  The size of what is left, signal by signal, over what is expected.  And its shape: how much of
+# it lies along what missing physics would look like — periodic in the motor's angle, following speed, current,
+# position or their signs — beyond what the fitted numbers could take away; each such direction is a χ² test of few
+# degrees of freedom, far sharper than the size.
+
+Floating = NDArray[np.floating]
+
+_SIZE = 1.3  # rms of what is left over what is expected, from which on the model has failed
+_SLOW = 1.8  # the same of means over the time in which errors last
+_SHAPE = 1e-5  # probability of so much along one shape in a model that fits
+_ORDERS = 48  # periods in each turn of the motor, up to which its angle is looked at
+_EDGE = 2.9  # σ, where a parameter stands at the edge of its tolerance
+
+
+@dataclass(frozen=True)
+class Adequacy:
+    """The verdict on a fit."""
+
+    adequate: bool
+    ratio: float  # of what is left over what is expected, the worst of all signals and of the worst shape
+    reason: str
+    uninformative: bool = False  # the recordings tell nothing, whatever model they are held against
+
+
+def adequacy(found: Fitted) -> Adequacy:
+    """Judges a best fit."""
+    name, why = silent(found.problem.model.windows, found.problem.floors)
+    if why:
+        title = in_sentence(SIGNAL_NAMES[name].title)
+        return Adequacy(False, 1.0, f"the {title} is constant, or no larger than its floor", uninformative=True)
+    sizes = _sizes(found)
+    for name, (size, slow) in sizes.items():
+        if size > _SIZE or slow > _SLOW:
+            ratio = max(size, slow)
+            title = in_sentence(SIGNAL_NAMES[name].title)
+            return Adequacy(False, ratio, f"the {title} is left {ratio:.1f} × its floor")
+    axes = found.problem.model.actuator.axes
+    edge = [
+        in_sentence(on_axes(one.name, axes).title)
+        for one, x in zip(found.problem.unknowns, found.x)
+        if abs(x) > _EDGE and one.is_base
+    ]
+    if edge:
+        whose = "its" if len(edge) == 1 else "their"
+        return Adequacy(False, 1.0, f"{', '.join(edge)} would have to be outside {whose} tolerance")
+    shape, ratio = _worst_shape(found)
+    if shape:
+        return Adequacy(False, ratio, f"the residual current {shape}")
+    return Adequacy(True, max(size for size, _ in sizes.values()), "")
+
+
+def _sizes(found: Fitted) -> dict[str, tuple[float, float]]:
+    """By signal, over all windows: rms over σ, and the same of slow means."""
+    whole: dict[str, list[Floating]] = {}
+    means: dict[str, list[Floating]] = {}
+    for window, name, rows in found.problem.parts():
+        values = found.residual[rows]
+        count = max(1, round(CORRELATED_S / found.problem.model.windows[window].block_s))
+        whole.setdefault(name, []).append(values)
+        if len(values) >= 4 * count:
+            folded = values[: len(values) // count * count].reshape(-1, count)
+            means.setdefault(name, []).append(folded.mean(axis=1) * np.sqrt(count))
+    found_sizes = {}
+    for name, values in whole.items():
+        slow = means.get(name)
+        # The weights of the positions count a lasting error as often as it lasts already.
+        slow_rms = _rms(slow) if slow and name == "current_A" else 0.0
+        found_sizes[name] = (_rms(values), slow_rms)
+    return found_sizes
+
+
+def _rms(parts: list[Floating]) -> float:
+    return float(np.sqrt(np.mean(np.concatenate(parts) ** 2)))
+
+
+def _worst_shape(found: Fitted) -> tuple[str, float]:
+    """The most significant shape in what is left of the current, "" if none is; and how large it is over the noise."""
+    problem = found.problem
+    parts = [part for part in problem.parts() if part[1] == "current_A"]
+    rows = np.concatenate([np.arange(part[2].start, part[2].stop) for part in parts])
+    residual = found.residual[rows]
+    scale = max(1.0, float(np.sqrt(np.mean(residual**2))))
+    q, _ = np.linalg.qr(found.slopes)  # the prior's rows hold back what tolerances allow
+    q = q[rows]
+    shapes = _shapes(found, [part[0] for part in parts])
+    worst, least, size = "", _SHAPE / len(shapes), 1.0
+    from scipy.special import chdtrc
+
+    for name, columns in shapes:
+        columns = columns * np.concatenate(
+            [problem.over_sigma(window, "current_A", np.ones(r.stop - r.start)) for window, _, r in parts]
+        )[:, None]  # fmt: skip
+        own = columns - q @ (q.T @ columns)
+        norm = np.linalg.norm(own, axis=0)
+        kept = norm > 1e-3 * np.linalg.norm(columns, axis=0) + 1e-12
+        if not kept.any():
+            continue
+        basis, _ = np.linalg.qr(own[:, kept] / norm[kept])
+        energy = float(np.sum((basis.T @ residual) ** 2)) / scale**2
+        chance = float(chdtrc(basis.shape[1], energy))
+        if chance < least:
+            worst, least, size = name, chance, np.sqrt(1.0 + energy / len(residual))
+    return worst, float(size)
+
+
+def _shapes(found: Fitted, windows: list[int]) -> list[tuple[str, Floating]]:
+    """What missing physics would look like in the current, by name: (blocks, few) each."""
+    traces = [found.problem.simulate(found.x[None, :], i) for i in windows]
+    blocks = [found.problem.model.windows[i].block_s for i in windows]
+
+    def joined(name: str) -> Floating:
+        return np.concatenate([one[name][0] for one in traces])
+
+    angle, speed, current = joined("motor_position_rad"), joined("motor_speed_rad_s"), joined("current_A")
+    acceleration = np.concatenate([np.gradient(one["motor_speed_rad_s"][0], b) for one, b in zip(traces, blocks)])
+    top = np.max(np.abs(speed)) + 1e-12
+    sign = np.tanh(speed / (0.02 * top))
+    reversal = np.exp(-((speed / (0.05 * top)) ** 2))
+    shapes = [
+        ("follows the motor's speed", np.stack([speed, speed * np.abs(speed)], axis=1)),
+        ("follows the direction of motion", sign[:, None]),
+        ("follows the size of the load", np.stack([np.abs(current) * sign, current], axis=1)),
+        ("is constant", np.ones((len(speed), 1))),
+        ("follows the position", np.stack([angle - angle.mean(), (angle - angle.mean()) ** 2], axis=1)),
+        ("follows the acceleration", acceleration[:, None]),
+        ("stands at reversals", np.stack([reversal, reversal * np.sign(acceleration)], axis=1)),
+        ("changes with time", np.linspace(-1.0, 1.0, len(speed))[:, None]),
+    ]
+    for order in range(1, _ORDERS + 1):
+        wave = np.stack([np.cos(order * angle), np.sin(order * angle)], axis=1)
+        shapes.append((f"repeats {order} times a turn of the motor", wave))
+        shapes.append((f"repeats {order} times a turn, in step with the current", wave * current[:, None]))
+    return shapes
+
+
+# --- the run that would tell apart what a recording cannot: each of some commands, judged by what it would add --------
+
+next_experiment_Array = NDArray[np.floating]
+
+_COMMANDS: tuple[tuple[str, dict[str, float], float], ...] = (
+    ("chirp", {"amplitude_rad": 0.005}, 0.5),
+    ("chirp", {"amplitude_rad": 0.02}, 0.5),
+    ("sine", {"amplitude_rad": 0.005, "frequency_Hz": 6.0}, 0.5),
+    ("sine", {"amplitude_rad": 0.05, "frequency_Hz": 2.0}, 0.5),
+    ("step", {"final_rad": 0.005}, 0.5),
+    ("staircase", {"step_rad": 0.002}, 0.5),
+)
+_STEP_S = 5e-5  # of the model, as exact as an estimate of what a run would tell need be
+_CURRENT_A = 0.2  # noise of a block, where the recording does not tell
+
+
+@dataclass(frozen=True)
+class Suggestion:
+    """A run, and how much less k would be spread after it."""
+
+    command: str
+    settings: dict[str, float]  # of the command; the others are its usual ones
+    duration_s: float
+    gain: float  # of the σ of the k in question, before over after
+
+    @property
+    def options(self) -> str:
+        """The run as `emaviz simulate` takes it."""
+        chosen = "".join(f" --set {name}={value:g}" for name, value in self.settings.items())
+        return f"--command {self.command}{chosen} --duration {self.duration_s:g}"
+
+
+def separating(found: Fitted, covariance: next_experiment_Array, names: Sequence[str]) -> Suggestion | None:
+    """The command after which the k of these names (k1…k8) would be known best; None if none helps."""
+    columns = sorted({c for name in names for c in _columns(name)})
+    best: Suggestion | None = None
+    before = np.sqrt(np.diag(covariance)[columns])
+    known = np.linalg.inv(np.linalg.cholesky(covariance))  # rows: kᵀ rowsᵀ rows k is what the recordings tell
+    for name, settings, duration in _COMMANDS:
+        told = _information(found, Run(command(name, settings), duration))
+        if told is None:
+            continue
+        root = np.linalg.inv(np.linalg.qr(np.concatenate([known, told]), mode="r"))
+        after = np.linalg.norm(root, axis=1)[columns]
+        gain = float(np.max(before / after))
+        if gain > 1.3 and (best is None or gain > best.gain):
+            best = Suggestion(name, settings, duration, gain)
+    return best
+
+
+def _columns(name: str) -> tuple[int, ...]:
+    return {"k6": (5, 6), "k7": (5, 6), "k8": (7,)}.get(name, (int(name[1]) - 1,))
+
+
+def _information(found: Fitted, run: Run) -> next_experiment_Array | None:
+    """What such a recording would tell of k, its rig's unknowns integrated out: (8, 8), a root of the information."""
+    problem = found.problem
+    plant = problem.model
+    try:
+        recording = simulate_monitor(run, plant.actuator, found.k, plant.effects, plant.stack.circuit)
+        own = ClosedLoop([recording], plant.actuator, effects=plant.effects, circuit=plant.stack.circuit)
+        own = own.at_longer_steps(_STEP_S)
+    except (InputError, FloatingPointError):
+        return None
+    window = own.windows[0]
+    typical = problem.floors[0]
+    known = typical.model
+    noise = {name: typical.noise.get(name, _CURRENT_A) for name in window.measured}
+    model = {
+        name: np.full(window.blocks, np.sqrt(np.mean(known[name] ** 2)) if name in known else 0.0)
+        for name in window.measured
+    }
+    kept = [one for one in problem.unknowns if one.kind in ("fault", "parameter") or one.place == 0]
+    own_floor = Floor(noise, model, repeats_of(window, noise), window.block_s, typical.white)
+    own_problem = Problem(own, [own_floor], kept)
+    _, slopes = own_problem.jacobians(own_problem.at(found.k)[None, :])
+    # The faults last: what is left of them beside the rig's unknowns; normal equations would round it away.
+    ordered = np.concatenate([slopes[0][:, FAULTS:], slopes[0][:, :FAULTS] / K_SIGMA], axis=1)
+    return np.asarray(np.linalg.qr(ordered, mode="r"))[-FAULTS:, -FAULTS:]
+
+
+# --- intervals of a number that cannot be negative, from an estimate that can lie anywhere ----------------------------
+# An interval k̂ ± 1.645 σ cut off at 0 covers a true 0 too often, and one that follows the data alone too seldom.
+# G. J. Feldman and R. D. Cousins, Unified approach to the classical statistical analysis of small signals, Phys. Rev.
+# D 57 (1998) 3873–3889, order the outcomes by their likelihood against the best that is allowed, which covers each
+# true value equally often.  Everything here is in units of σ.
+
+feldman_cousins_Array = NDArray[np.float64]
+
+_FAR = 6.0  # from here on the bound is not felt
+_STEP = 0.02
+
+
+def above_zero(estimate: float) -> tuple[float, float]:
+    """90 % interval of μ ≥ 0 from an estimate that is normal about μ, σ = 1."""
+    return _interval("normal", estimate)
+
+
+def length_of_vector(estimate: float) -> tuple[float, float]:
+    """90 % interval of the length of a vector in the plane from the length of its estimate, σ = 1 along each axis."""
+    return _interval("rice", max(estimate, 0.0))
+
+
+def _interval(kind: str, estimate: float) -> tuple[float, float]:
+    if estimate >= _FAR:
+        return estimate - HALF_90, estimate + HALF_90
+    truth, low, high = _belt(kind)
+    at = max(estimate, float(low[0]) + 1e-9)
+    # the truths that would have given this estimate among their likely ones
+    inside = truth[(low <= at) & (at <= high)]
+    return float(inside[0]) if inside[0] > truth[0] else 0.0, float(inside[-1])
+
+
+@lru_cache(maxsize=2)
+def _belt(kind: str) -> tuple[feldman_cousins_Array, feldman_cousins_Array, feldman_cousins_Array]:
+    """For truths μ (n,): the ends of the likely outcomes, 90 % of them, by the order of the likelihood ratio."""
+    truth = np.arange(0.0, _FAR + 4.0, _STEP)
+    outcome = np.arange(-4.0 if kind == "normal" else _STEP / 2, _FAR + 9.0, _STEP)
+    m, x = truth[:, None], outcome[None, :]
+    if kind == "normal":
+        likelihood = np.exp(-0.5 * (x - m) ** 2)
+    else:
+        likelihood = x * np.exp(-0.5 * (x - m) ** 2) * i0e(x * m)
+    ratio = likelihood / likelihood.max(axis=0)
+    probability = likelihood / likelihood.sum(axis=1, keepdims=True)
+    order = np.argsort(-ratio, axis=1, kind="stable")
+    taken = np.cumsum(np.take_along_axis(probability, order, axis=1), axis=1)
+    count = np.argmax(taken >= 0.9, axis=1) + 1
+    ends = [(outcome[order[i, : count[i]]].min(), outcome[order[i, : count[i]]].max()) for i in range(len(truth))]
+    low, high = np.array(ends).T
+    return truth, np.where(low <= outcome[0], -np.inf, low), high
+
+
+# --- how sure an identification is: intervals, a joint test of health, and what the data cannot separate --------------
+# Everything is linearised at the best fit, in which the base parameters, the starts and unrecorded loads moved with k.
+# The covariance is the sandwich H⁻¹ M H⁻¹: H from the weighted derivatives and the tolerances' prior, M from what the
+# errors really are — the recordings' white noise, the tolerances, and the twins' deviations, which last.  A few twins
+# tell their own spread roughly: what rests on it is widened as Student's t is beyond the normal distribution.
 
 Array = NDArray[np.float64]
 

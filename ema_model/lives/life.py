@@ -16,16 +16,15 @@ from ema_model.actuator import Actuator, load_actuator
 from ema_model.commands import command
 from ema_model.errors import InputError, quoted
 from ema_model.estimation.unknowns import ECCENTRICITY, to_vector
-from ema_model.files.shipped import shipped_folder
+from ema_model.files.opened import shipped_folder
 from ema_model.identification.fit import refine, setting
-from ema_model.identification.objective import Objective
+from ema_model.identification.search import Objective
 from ema_model.identification.uncertainty import uncertainty
 from ema_model.recordings import Measurement, write_measurement
+from ema_model.recordings.measurement import Sensors
 from ema_model.simulation.plant import simulate
 from ema_model.simulation.run import Run
-from ema_model.simulation.sensors import Sensors
-from ema_model.tracking.flight import Flight
-from ema_model.tracking.identify import UNFIT
+from ema_model.tracking.flights import UNFIT, Flight
 
 # --- what a flight asks of the actuator: a command and a load, the harder the more it wears ---------------------------
 

@@ -1,7 +1,8 @@
-"""The white noise of a recorded signal, from the signal itself."""
+"""What signals tell by themselves: their noise and steps, the delay between two, how late a speed comes."""
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from functools import lru_cache
 from itertools import pairwise
 from math import comb
@@ -10,6 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ema_model.quantities.signals import SIGNALS
+
+# --- the white noise of a recorded signal, from the signal itself -----------------------------------------------------
 
 Array = NDArray[np.float64]
 
@@ -126,3 +129,371 @@ def _typical(differences: Array) -> float:
     size = np.abs(differences)
     near = size <= NEAR * 1.4826 * float(np.median(size))
     return float(np.sqrt(np.mean(size[near] ** 2))) / WITHIN
+
+
+# --- what a signal's own numbers tell of the sensor -------------------------------------------------------------------
+# Quantisation, noise, flat tops; and of two signals: delay, slope.
+
+_MOST_BLOCKS, _BLOCK = 32, 2048  # what is looked at of a long signal
+_MOST_FFT = 1 << 18
+_FINEST_SHARE = 1e-10  # of the largest value: below it differences are what rounding left of a calculation
+
+
+def sample_blocks(values: Array, runs: list[slice]) -> list[Array]:
+    """Pieces of consecutive samples, spread over all runs; at most some 65000 samples."""
+    total = sum(run.stop - run.start for run in runs)
+    if total <= _MOST_BLOCKS * _BLOCK:
+        return [values[run] for run in runs]
+    pieces = []
+    for start in np.linspace(0, total - _BLOCK, _MOST_BLOCKS).astype(int):
+        for run in runs:
+            length = run.stop - run.start
+            if start < length:
+                pieces.append(values[run.start + start : min(run.start + start + _BLOCK, run.stop)])
+                break
+            start -= length
+    return pieces
+
+
+def quantisation_step(blocks: list[Array]) -> float:
+    """The step that all differences are multiples of, in the signal's unit; 0 where none is seen.
+
+    A decimal fraction written to the file counts as a step too.
+    """
+    steps = np.concatenate([np.abs(np.diff(block)) for block in blocks] or [np.zeros(0)])
+    largest = max((float(np.max(np.abs(block))) for block in blocks if block.size), default=0.0)
+    moved = steps[steps > _FINEST_SHARE * largest]
+    if moved.size < 10:
+        return 0.0
+    for candidate in np.unique(np.quantile(moved, [0.0, 0.001, 0.01, 0.05, 0.1, 0.25], method="lower"))[::-1]:
+        step = float(candidate)
+        for most in (4, 30):  # the first guess is off by rounding, and the more so the larger the multiple
+            near = moved[moved < (most + 0.5) * step]
+            multiple = np.round(near / step)
+            if near.size and (multiple > 0.0).any():
+                step = float(near @ multiple / (multiple @ multiple))
+        near = moved[moved < 30.5 * step]
+        multiple = np.round(near / step)
+        off = np.abs(near / step - multiple)
+        # A smooth signal has hardly any small differences; a ramp has all the same.
+        if (
+            near.size >= max(10, 0.2 * moved.size)
+            and np.mean(off < 0.15) > 0.98
+            and (np.mean(multiple != np.median(multiple)) > 0.02 or moved.size < 0.9 * steps.size)
+        ):
+            return step
+    return 0.0
+
+
+def noise_rms(blocks: list[Array]) -> float:
+    """White noise, rms, from differences of first to fifth order, the tenth with the largest left out.
+
+    Differences take out what is smooth and the trimming what jumps; the least of the orders is taken.
+    Filtered noise reads too small; chopping ripple and quantisation are in it.  NaN below 32 samples.
+    """
+    least = float("inf")
+    for order in range(1, 6):
+        differences = np.concatenate([np.diff(block, order) for block in blocks if block.size > order] or [np.zeros(0)])
+        if differences.size < 32:
+            continue
+        squares = differences * differences
+        kept = np.partition(squares, int(0.9 * squares.size))[: int(0.9 * squares.size)]
+        # 0.6229 is the mean of the smallest nine tenths of squared Gaussian numbers.
+        least = min(least, float(np.sqrt(np.mean(kept) / 0.6229 / comb(2 * order, order))))
+    return least if np.isfinite(least) else float("nan")
+
+
+def flat_tops(values: Array, noise: float) -> tuple[float, float]:
+    """A level that |values| is cut off at, and the share of samples there; (NaN, 0) where there is none.
+
+    At a cut many times more samples lie just below the maximum than in the band under that.
+    """
+    size = np.abs(values)
+    level = float(np.max(size, initial=0.0))
+    if level == 0.0 or not np.isfinite(noise):
+        return float("nan"), 0.0
+    band = min(max(9.0 * noise, 2e-3 * level), 0.2 * level)
+    top = np.mean(size > level - band)
+    below = np.mean((size <= level - band) & (size > level - 2.0 * band))
+    if top > 0.01 and top > 5.0 * below and top < 0.95:
+        return level - 0.5 * band, float(top)
+    return float("nan"), 0.0
+
+
+@dataclass(frozen=True)
+class Slope:
+    """How one signal's changes go with another's: their ratio, and the correlation that says how surely."""
+
+    ratio: float
+    correlation: float
+
+
+def slope(changes: Array, expected: Array) -> Slope:
+    """`changes` ≈ ratio·`expected`, both (n,), by least squares through zero; NaN where nothing moves."""
+    power = float(expected @ expected)
+    own = float(changes @ changes)
+    if power <= 0.0 or own <= 0.0:
+        return Slope(float("nan"), 0.0)
+    product = float(changes @ expected)
+    return Slope(product / power, product / np.sqrt(power * own))
+
+
+def changes_over(values: Array, edges: NDArray[np.intp]) -> Array:
+    """The change between consecutive edges, indices of samples; (edges − 1,)."""
+    return np.diff(values[edges])
+
+
+def window_edges(runs: list[slice], windows: int = 1000, least: int = 8) -> list[NDArray[np.intp]]:
+    """Indices that cut each run into windows of equal counts of samples, all runs about `windows` in all."""
+    total = sum(run.stop - run.start for run in runs)
+    width = max(least, total // windows)
+    return [np.arange(run.start, run.stop, width) for run in runs if run.stop - run.start > 2 * width]
+
+
+def integrated(values: Array, time: Array) -> Array:
+    """The trapezoidal integral from the first sample on; the same shape."""
+    steps = 0.5 * (values[1:] + values[:-1]) * np.diff(time)
+    return np.concatenate([[0.0], np.cumsum(steps)])
+
+
+def delay_s(command: Array, response: Array, time: Array) -> tuple[float, float]:
+    """How much later the response moves than the command, s, and the correlation of their speeds at that delay.
+
+    The maximum of the cross-correlation, between samples by a parabola; looked for up to a quarter of the
+    time, both ways.  (NaN, 0) where one of them does not move.
+    """
+    samples = min(time.size, _MOST_FFT)
+    grid = np.linspace(time[0], time[-1], samples)
+    period = (time[-1] - time[0]) / (samples - 1)
+    first, second = (np.diff(np.interp(grid, time, signal)) for signal in (command, response))
+    # Steps of a coarse encoder are not what to align.
+    first, second = first - first.mean(), second - second.mean()
+    power = np.sqrt((first @ first) * (second @ second))
+    if not power > 0.0:
+        return float("nan"), 0.0
+    size = 1 << int(2 * first.size - 1).bit_length()
+    spectrum = np.conj(np.fft.rfft(first, size)) * np.fft.rfft(second, size)
+    correlation = np.fft.irfft(spectrum, size)
+    reach = max(2, first.size // 4)
+    lags = np.arange(-reach, reach + 1)
+    window = correlation[lags]
+    sign = 1.0 if window.max() >= -window.min() else -1.0
+    best = int(np.argmax(sign * window))
+    shift = 0.0
+    if 0 < best < window.size - 1:
+        before, at, after = sign * window[best - 1 : best + 2]
+        curvature = before - 2.0 * at + after
+        shift = 0.5 * (before - after) / curvature if curvature < 0.0 else 0.0
+    return float((lags[best] + shift) * period), float(window[best] / power)
+
+
+def rotation_order(phases: Array, angle: Array, pole_pairs: float | None) -> tuple[float, float, float, float]:
+    """How the three currents turn with the motor: pole pairs, likeness to A-B-C and to A-C-B, rotor offset in rad.
+
+    `phases`: (3, n), A; `angle`: (n,), rad.  The likenesses run from 0 to 1.  Without given pole pairs 1 to 24
+    are tried.  The squared current vector is used, in which the torque's sign has no part; the offset is so
+    known up to a multiple of π/pole pairs.
+    """
+    if angle.size > 20_000:
+        chosen = np.linspace(0, angle.size - 1, 20_000).astype(int)
+        phases, angle = phases[:, chosen], angle[chosen]
+    third = 2.0j * np.pi / 3.0
+    vector = phases[0] + phases[1] * np.exp(third) + phases[2] * np.exp(-third)
+    squared = vector * vector
+    total = np.sum(np.abs(squared))
+    if not total > 0.0:
+        return float("nan"), 0.0, 0.0, float("nan")
+    turn = np.exp(-2.0j * (angle - angle[0]))
+    tried = [float(pole_pairs)] if pole_pairs else [float(p) for p in range(1, 25)]
+    found: dict[float, tuple[float, float, float, float]] = {}
+    factor = np.ones_like(turn)
+    for pairs in tried:
+        factor = np.exp(-2.0j * pairs * (angle - angle[0])) if pole_pairs else factor * turn
+        forward = np.sum(squared * factor) / total
+        backward = np.sum(squared * np.conj(factor)) / total
+        back = forward * np.exp(-2.0j * pairs * angle[0])
+        offset = float(np.angle(-back) / (2.0 * pairs))
+        found[pairs] = (pairs, float(abs(forward)), float(abs(backward)), offset)
+    best = max(found.values(), key=lambda one: max(one[1:3]))
+    half = found.get(best[0] / 2.0)
+    if half:
+        # Currents in blocks carry a fifth harmonic; in the square it turns backward at twice the fundamental.
+        opposite = half[1] if best[2] > best[1] else half[2]
+        if opposite > 0.5 * max(best[1:3]) and opposite > 2.0 * min(half[1:3]):
+            return half
+    return best
+
+
+# --- how much later a speed comes than the position that it is the derivative of, and how sure that is ----------------
+# Over a window the position changes as the speed's integral does, moved by the delay d: Δp(t) = a·ΔV(t + d) + b·Δt,
+# with the speed's scale and offset in a and b.  Gauss-Newton steps in d have the position's own curvature for an
+# instrument: the speed's noise is not in it, and the position's lies evenly about the window's ends, so that neither
+# moves d nor makes its interval narrower than it is.  The interval is Student's over blocks of time, which need be
+# neither white nor alike inside (a cluster-robust covariance; Cameron and Miller, J. Human Resources 50 (2015)); a
+# block counts by its share of the motion.  A drift between two clocks is a delay that grows evenly over the recording,
+# d = d₀ + d₁·τ with τ from −½ to ½, and is told in the same way, with the curvature times τ for its instrument.
+
+_MOST = 60_000  # samples that are looked at; of more, means over neighbours, which move neither against the other
+_LAG_BLOCKS = 16
+_FEWEST = 4.0  # blocks that must have a part in the motion
+_STEPS = 12
+_ALIKE = 0.5  # correlation of the two changes, below which one is not the other's derivative
+_NEAR = 0.3  # of the time in which the speed changes by itself, up to which an interval is told
+_RESOLVED = 0.01  # of a period: what interpolation between samples is off by
+_SURE = 0.995  # of Student's distribution: a drift is seldom there, so that it takes more to claim one
+
+
+@dataclass(frozen=True)
+class Lag:
+    """By how much the speed is later than the position, s, with its 90 % interval."""
+
+    lag_s: float
+    low_s: float
+    high_s: float
+
+
+@dataclass(frozen=True)
+class Drift:
+    """By how much the speed's clock runs fast, s per s of the position's, with its 90 % interval."""
+
+    rate: float
+    low: float
+    high: float
+    is_sure: bool  # zero is outside its 99 % interval
+
+
+def speed_lag(position: Array, speed: Array, time: Array, stretches: list[slice]) -> Lag | None:
+    """The lag of a speed, in any unit, behind its position, (n,) each; None where the motion does not tell one.
+
+    stretches: samples without a gap between them, in order.
+    """
+    found = _fitted(position, speed, time, stretches, False)
+    return found and Lag(found.value, found.value - found.half, found.value + found.half)
+
+
+def clock_drift(position: Array, speed: Array, time: Array, stretches: list[slice]) -> Drift | None:
+    """How much faster the clock of a speed runs than that of its position; as `speed_lag`."""
+    found = _fitted(position, speed, time, stretches, True)
+    if found is None:
+        return None
+    rate, half = found.value / found.lasted_s, found.half / found.lasted_s
+    return Drift(rate, rate - half, rate + half, abs(found.value) > found.sure_half)
+
+
+@dataclass(frozen=True)
+class _Found:
+    """The delay, or what it grows by over the recording, s, and half the widths of its intervals, of 90 and 99 %."""
+
+    value: float
+    half: float
+    sure_half: float
+    lasted_s: float
+
+
+def _fitted(position: Array, speed: Array, time: Array, stretches: list[slice], drifts: bool) -> _Found | None:
+    total = sum(one.stop - one.start for one in stretches)
+    parts = [_thinned(position[one], speed[one], time[one], max(1, -(-total // _MOST))) for one in stretches]
+    parts = [one for one in parts if one.time.size >= 32]
+    if not parts:
+        return None
+    longest = max(parts, key=lambda one: one.time.size)
+    start, _ = delay_s(longest.position, longest.travelled, longest.time)
+    if not np.isfinite(start):
+        return None
+    samples = sum(one.time.size for one in parts)
+    windows = [2**i for i in range(1, 16) if 6 * 2**i <= samples // _LAG_BLOCKS]
+    with np.errstate(all="ignore"):  # what does not move tells nothing, and is left out
+        found = [one for window in windows if (one := _late(parts, window, start, drifts)) is not None]
+    # The narrowest of several intervals is narrower than it should be, by its luck.
+    return sorted(found, key=lambda one: one.half)[:2][-1] if found else None
+
+
+@dataclass(frozen=True)
+class _Part:
+    """A stretch: position, speed and its integral at the same times, (n,) each."""
+
+    position: Array
+    speed: Array
+    travelled: Array
+    time: Array
+
+    def later(self, time: Array) -> tuple[Array, Array]:
+        """The integral and the speed at times between samples."""
+        at = np.clip(np.searchsorted(self.time, time, "right") - 1, 0, self.time.size - 2)
+        since, step = time - self.time[at], self.time[at + 1] - self.time[at]
+        gained = since / step * (self.speed[at + 1] - self.speed[at])
+        return self.travelled[at] + since * (self.speed[at] + 0.5 * gained), self.speed[at] + gained
+
+
+def _thinned(position: Array, speed: Array, time: Array, every: int) -> _Part:
+    whole = time.size // every * every
+    position, speed, time = (values[:whole].reshape(-1, every).mean(axis=1) for values in (position, speed, time))
+    return _Part(position, speed, integrated(speed, time), time)
+
+
+def _late(parts: list[_Part], half_window: int, start: float, drifts: bool) -> _Found | None:
+    """By windows of so many samples on either side."""
+    period = float(np.median(np.diff(parts[0].time)))
+    middle, lasted = 0.5 * (parts[0].time[0] + parts[-1].time[-1]), parts[-1].time[-1] - parts[0].time[0]
+    beside = max(1, half_window // 2)
+    late = np.array([start, 0.0] if drifts else [start])
+    for _ in range(_STEPS):
+        rows = [_rows(one, half_window, beside, late, middle, lasted) for one in parts]
+        changes, regressors, instruments = (np.concatenate(columns) for columns in zip(*rows))
+        if len(changes) < 8 * _LAG_BLOCKS:
+            return None
+        moments = instruments.T @ regressors
+        if not np.linalg.cond(moments / np.abs(moments).max(axis=0, initial=1e-300)) < 1e12:
+            return None
+        found = np.linalg.solve(moments, instruments.T @ changes)
+        step = found[1:-1] / found[0]
+        late += step
+        if np.all(np.abs(step) < 1e-4 * period):
+            break
+    else:
+        return None
+    gain, travelled, told = found[0], regressors[:, 0], late.size  # its column, and place
+    curved = regressors[:, told]
+    if not np.corrcoef(changes, travelled)[0, 1] ** 2 > _ALIKE**2:
+        return None
+    left = changes - regressors @ found
+    edges = np.linspace(0, len(left), _LAG_BLOCKS + 1).astype(int)[:-1]
+    inverse = np.linalg.inv(moments)[told]
+    pulls = np.add.reduceat((instruments @ inverse) * left, edges) / gain
+    shares = np.add.reduceat((instruments @ inverse) * curved, edges)
+    count = 1.0 / float(shares @ shares)
+    if not count >= _FEWEST:
+        return None
+    from scipy.special import stdtrit  # takes a while to import
+
+    spread = float(np.linalg.norm(pulls / (1.0 - shares)))
+    half, sure = (float(np.hypot(stdtrit(count - 1.0, p) * spread, _RESOLVED * period)) for p in (0.95, _SURE))
+    if not half < _NEAR * np.std(travelled) / np.std(curved):
+        return None
+    return _Found(float(late[-1]), half, sure, float(lasted))
+
+
+def _rows(part: _Part, m: int, beside: int, late: Array, middle: float, lasted: float) -> tuple[Array, Array, Array]:
+    """The position's changes over windows; what explains them: the integral's, the speed's and time's; instruments.
+
+    late: the delay, and what it grows by over the recording, which lasts so long about its middle.
+    """
+    reach, time = m + beside, part.time
+    i = np.arange(reach, time.size - reach)
+    since = (time - middle) / lasted
+    shifted = time + late[0] + (late[1] * since if late.size > 1 else 0.0)
+    i = i[(shifted[i - m] >= time[0]) & (shifted[i + m] <= time[-1])]
+    after, speed_after = part.later(shifted[i + m])
+    before, speed_before = part.later(shifted[i - m])
+    travelled, spanned = after - before, time[i + m] - time[i - m]
+    p = part.position
+    curved = p[i + m + beside] - p[i - m + beside] - p[i + m - beside] + p[i - m - beside]
+    regressors, instruments = [travelled, speed_after - speed_before], [travelled, curved]
+    if late.size > 1:
+        regressors.append(speed_after * since[i + m] - speed_before * since[i - m])
+        instruments.append(curved * since[i])
+    return (
+        p[i + m] - p[i - m],
+        np.column_stack([*regressors, spanned]),
+        np.column_stack([*instruments, spanned]),
+    )

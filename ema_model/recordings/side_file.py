@@ -11,8 +11,7 @@ from pathlib import Path, PurePosixPath, PureWindowsPath
 from typing import Any, Literal, cast
 
 from ema_model.errors import InputError, quoted
-from ema_model.files.limits import TEXT_BYTES
-from ema_model.files.opened import listed, open_user_file, reason, refusal, shown
+from ema_model.files.opened import TEXT_BYTES, listed, open_user_file, reason, refusal, shown
 from ema_model.files.written import change_file, inline, toml_of, toml_text
 from ema_model.quantities.si import of_name, without_unit
 from ema_model.quantities.signals import SIGNALS

@@ -14,10 +14,9 @@ from ema_model.actuator.layout import WITHOUT_LOOP
 from ema_model.commands import Command
 from ema_model.errors import InputError, quoted
 from ema_model.recordings import Measurement
-from ema_model.simulation import precompile as ahead
-from ema_model.simulation.one_stack import library_stack, own_stack, stack_at_hand
+from ema_model.simulation import compiled
+from ema_model.simulation.compiled import library_stack, own_stack, stack_at_hand, wait_for
 from ema_model.simulation.pack import EffectSettings, initial_reference_state, reference_rows
-from ema_model.simulation.precompile import wait_for
 from ema_model.simulation.run import (
     REFERENCE_SUBSTEPS,
     Run,
@@ -112,18 +111,18 @@ def note(actuator: Actuator) -> str:
 def is_compiled(actuator: Actuator, effects: Mapping[str, Any]) -> bool:
     """Whether the next simulation with these effects begins at once."""
     kernel = _kernel(actuator)
-    return ahead.is_compiled(stack_at_hand(actuator, effects, "reduced", kernel), kernel)
+    return compiled.is_compiled(stack_at_hand(actuator, effects, "reduced", kernel), kernel)
 
 
 def compile_own(actuator: Actuator) -> None:
     """Compiles what every simulation without hidden effects takes, of an actuator that has effects in its file too."""
-    ahead.compile_here(own_stack(actuator), _kernel(actuator))
+    compiled.compile_here(own_stack(actuator), _kernel(actuator))
 
 
 def compile_behind(actuator: Actuator) -> None:
     """Begins to compile what the first hidden effect and the first discovery need, in another process."""
     library = library_stack(actuator)
-    ahead.compile_ahead([(library, _kernel(actuator)), (library, "traces")], urgent=False)
+    compiled.compile_ahead([(library, _kernel(actuator)), (library, "traces")], urgent=False)
 
 
 def simulate(

@@ -1,8 +1,9 @@
-"""One run of a model: a command and a load in, signals out; and the kernels that do it for a population."""
+"""One run of a model: a command and a load in, signals out."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import math
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -12,7 +13,7 @@ from ema_model.actuator import Actuator
 from ema_model.actuator.layout import WITHOUT_LOOP
 from ema_model.commands import COMMANDS, Command, command
 from ema_model.effects import find
-from ema_model.errors import InputError, quoted
+from ema_model.errors import InputError, did_you_mean, quoted
 from ema_model.physics.rows import LANES
 from ema_model.quantities.axes import ROTARY, Axes
 from ema_model.quantities.numbers import check_number
@@ -20,11 +21,76 @@ from ema_model.quantities.sides import USER
 from ema_model.quantities.titles import in_sentence, parameter_title, unit_of
 from ema_model.recordings import Measurement
 from ema_model.side_by_side import blocks
-from ema_model.simulation.load_profile import LoadProfile, RecordedLoad
-from ema_model.simulation.one_stack import stack_at_hand
+from ema_model.simulation.compiled import stack_at_hand, wait_for
 from ema_model.simulation.pack import initial_reference_state, initial_state, monitor_rows, reference_rows
-from ema_model.simulation.precompile import wait_for
 from ema_model.stacks import Stack
+
+# --- how the load on the user shaft goes over time: constant, a step, a sine or a chirp (the thesis's load block) -----
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class LoadProfile:
+    """Shares of the run's load torque over time.
+
+    time_s: when a step comes, and how long a chirp's frequency rises; frequency_Hz: of a sine, and where a chirp ends.
+    Raises InputError for a shape that does not exist, for what is no number and for numbers that make no sense.
+    """
+
+    shape: str = "constant"
+    time_s: float = 0.1
+    frequency_Hz: float = 5.0
+
+    def __post_init__(self) -> None:
+        if self.shape not in SHAPES:
+            like = did_you_mean(self.shape, SHAPES)
+            raise InputError(
+                f"the load's shape must be one of {', '.join(SHAPES)}, not {quoted(self.shape, 40)!r}{like}"
+            )
+        for name in ("time_s", "frequency_Hz"):
+            value = getattr(self, name)
+            check_number(value, f"the load's {name}")
+            if not (math.isfinite(value) and value > 0.0):
+                raise InputError(f"the load's {name} must be above 0, not {value:g}")
+
+    def at(self, time_s: NDArray[np.floating]) -> Array:
+        """Shares of the torque at these times, −1 … 1, (n,)."""
+        return _SHAPES[self.shape](np.asarray(time_s, dtype=float), self)
+
+
+@dataclass(frozen=True, eq=False)
+class RecordedLoad:
+    """Shares of the run's load torque as they were recorded, (n,) each; the last one stays."""
+
+    time_s: Array
+    shares: Array
+
+    def at(self, time_s: NDArray[np.floating]) -> Array:
+        """As `LoadProfile.at`."""
+        return np.interp(time_s, self.time_s, self.shares)
+
+
+def _constant(time_s: Array, _: LoadProfile) -> Array:
+    return np.ones_like(time_s)
+
+
+def _step(time_s: Array, profile: LoadProfile) -> Array:
+    return np.where(time_s < profile.time_s - 1e-12, 0.0, 1.0)
+
+
+def _sine(time_s: Array, profile: LoadProfile) -> Array:
+    return np.sin(2.0 * np.pi * profile.frequency_Hz * time_s)
+
+
+def _chirp(time_s: Array, profile: LoadProfile) -> Array:
+    swept = np.minimum(time_s, profile.time_s)
+    cycles = profile.frequency_Hz * (0.5 * swept**2 / profile.time_s + time_s - swept)
+    return np.sin(2.0 * np.pi * cycles)
+
+
+SHAPES = ("constant", "step", "sine", "chirp")
+_SHAPES: dict[str, Callable[[Array, LoadProfile], Array]] = dict(zip(SHAPES, (_constant, _step, _sine, _chirp)))
 
 # --- a run as a part of a sentence ------------------------------------------------------------------------------------
 
@@ -43,7 +109,6 @@ def run_in_words(command: str, settings: Mapping[str, float], duration_s: float,
 # --- the Monitor Model's and inverse dynamics' kernels called for a population ----------------------------------------
 # The Monitor Model's and inverse dynamics' kernels called for a population, its blocks of lanes side by side.
 
-Array = NDArray[np.float64]
 AnyFloat = NDArray[np.floating]
 
 

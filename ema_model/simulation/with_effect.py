@@ -15,8 +15,7 @@ from ema_model.commands import command
 from ema_model.effects import Effect, find
 from ema_model.errors import InputError
 from ema_model.recordings import Measurement
-from ema_model.simulation.one_stack import stack_at_hand
-from ema_model.simulation.precompile import is_compiled
+from ema_model.simulation.compiled import is_compiled, stack_at_hand
 from ema_model.simulation.run import Run, simulate_monitor
 
 Array = NDArray[np.float64]

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 from ema_model import faults
 from ema_model.tracking.evidence import LEAST_FLIGHTS
-from ema_model.tracking.flight import Flight
+from ema_model.tracking.flights import Flight
 from ema_model.tracking.result import Tracked
 from ema_model.tracking.track import Tracker
 

@@ -1,4 +1,4 @@
-"""Remaining life: the flights until k first crosses its threshold, as a distribution."""
+"""How a k wears, and the life that remains."""
 
 from __future__ import annotations
 
@@ -6,12 +6,133 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import ndtr, ndtri
+from scipy.special import log_ndtr, ndtr, ndtri
 
+from ema_model.physics.jit import recursion
 from ema_model.tracking.evidence import AHEAD, LONGEST, SAMPLES
-from ema_model.tracking.wear import Wear
+
+# --- how one k wears: level and drift of today, for each of many ways in which it may have come there -----------------
+# A way is an onset, a shape of the rate of wear since (constant, growing as a power of the time since the onset,
+# growing by a constant share a flight), and how unevenly flights wear.  For each, level and today's rate are the state
+# of a Kalman filter, and the flights' likelihood makes its weight: the maximum over the process noise has the most of
+# it.
 
 Array = NDArray[np.float64]
+
+POWERS = (1.0, 1.5, 2.0, 2.5, 3.0)  # k ∝ (flights since the onset)ᵖ
+GROWTHS = (1.0 / 150.0, 1.0 / 75.0, 1.0 / 40.0)  # the rate's share a flight
+UNEVEN = (0.3, 0.7, 1.2)  # coefficient of variation of a flight's wear
+_ONSETS = 14  # that are tried
+_STEADY = 0.4  # prior of a constant rate; the shapes that grow share the rest
+_AT_ONCE = 0.4  # of wear that began with the first flight, if the rate is constant; the later onsets share the rest
+_GROWING_AT_ONCE = 0.8  # the same if it grows: a wear that departs from the simplest in two ways is rarer
+_RATE = 0.03  # of k in a flight, 1 σ of the prior of today's rate
+_PASSES = 2
+_COUNTS = 0.75  # of the likelihood, between ways: it takes what flights wear as normal, and that is skewed
+
+
+@dataclass(frozen=True, eq=False)
+class Wear:
+    """By way, (ways,): weight, mean of level and today's rate, their covariance, and the way itself."""
+
+    weight: Array
+    level: Array
+    rate: Array
+    covariance: Array  # (ways, 3): of the level, of both, of the rate
+    age: Array  # flights since the onset
+    power: Array  # 0 where the rate grows by a share
+    growth: Array
+    uneven: Array
+    worn: Array  # today's level less the first flight's, in units of today's rate
+
+
+def wear(at: Array, k: Array, variance: Array, now: float) -> Wear:
+    """at (n,): the flights' numbers; k (n,), so turned that it grows; variance (n,) of their own noise."""
+    first = at[0]
+    onsets = np.unique(np.round(np.linspace(first - 1.0, max(now - 4.0, first - 1.0), _ONSETS)))
+    steps = np.arange(first + 1.0, now + 1.0)  # the flights in which something wears
+    since = np.maximum(steps - onsets[:, None], 0.0)  # (onsets, steps)
+    ages = np.maximum(now - onsets, 1.0)
+    by_power = (since / ages[:, None])[:, None, :] ** (np.array(POWERS)[:, None] - 1.0)
+    by_growth = np.exp(-np.array(GROWTHS)[:, None] * (now - steps))
+    rates = np.concatenate([by_power, np.broadcast_to(by_growth, (len(onsets), *by_growth.shape))], axis=1)
+    rates = (rates * (since > 0.0)[:, None, :]).reshape(-1, len(steps))
+    table = np.zeros((len(rates), 2, len(steps) + 1))
+    table[:, 0, 1:], table[:, 1, 1:] = np.cumsum(rates, axis=1), np.cumsum(rates**2, axis=1)
+    # ways: onsets × shapes × unevenness
+    shapes = len(POWERS) + len(GROWTHS)
+    count = len(rates) * len(UNEVEN)
+    shape = np.repeat(np.arange(len(rates)), len(UNEVEN))
+    age = np.repeat(ages, shapes * len(UNEVEN))
+    kind = shape % shapes
+    power, growth = np.array([*POWERS, *[0.0] * len(GROWTHS)])[kind], np.array([*[0.0] * len(POWERS), *GROWTHS])[kind]
+    uneven = np.tile(np.array(UNEVEN), count // len(UNEVEN))
+    at_once = np.where(kind > 0, _GROWING_AT_ONCE, _AT_ONCE)
+    later = np.repeat(onsets >= first, shapes * len(UNEVEN))
+    prior = np.log(np.where(kind > 0, (1.0 - _STEADY) / (shapes - 1), _STEADY))
+    prior += np.log(np.where(later, (1.0 - at_once) / max(len(onsets) - 1, 1), at_once))
+    places = (at - first).astype(np.int64)
+    last = np.append(places, int(now - first))  # the state is today's, whether today's flight is usable or not
+    path = np.ascontiguousarray(table[:, :, last].transpose(1, 2, 0))
+    found = _filtered(path, np.array(UNEVEN), k, variance, _RATE, _PASSES)
+    level, rate, a, b, c, fit = found.reshape(-1, 6).T
+    sigma = np.sqrt(np.maximum(c, 1e-18))
+    weight = _COUNTS * fit + prior + log_ndtr(rate / sigma)
+    weight = np.exp(weight - weight.max())
+    worn = table[:, 0, -1][shape]
+    return Wear(weight / weight.sum(), level, rate, np.stack([a, b, c], axis=1), age, power, growth, uneven, worn)
+
+
+@recursion
+def _filtered(path, uneven, k, variance, rate_sigma, passes):  # pragma: no cover (compiled)
+    """(shapes, uneven, 6): level, rate, their (co)variances, log likelihood; path (2, flights + 1, shapes).
+
+    All shapes stand side by side in each step, which a processor takes several of at once.
+    """
+    shapes, flights = path.shape[2], len(k)
+    found = np.zeros((shapes, len(uneven), 6))
+    usual, spread, x, r = np.empty(shapes), np.empty(shapes), np.empty(shapes), np.empty(shapes)
+    a, b, c = np.empty(shapes), np.empty(shapes), np.empty(shapes)
+    squared, product, logarithm = np.empty(shapes), np.empty(shapes), np.empty(shapes)
+    for way in range(len(uneven)):
+        for j in range(shapes):
+            usual[j] = max((k[flights - 1] - k[0]) / max(path[0, flights, j] - path[0, 0, j], 1.0), 1e-5)
+        for _ in range(passes):
+            for j in range(shapes):
+                x[j], r[j] = k[0], 0.0
+                a[j], b[j], c[j] = variance[0], 0.0, rate_sigma**2
+                squared[j], product[j], logarithm[j] = 0.0, 1.0, 0.0
+                usual[j] = (uneven[way] * usual[j]) ** 2
+            for i in range(1, flights):
+                for j in range(shapes):
+                    d = path[0, i, j] - path[0, i - 1, j]
+                    level, both = x[j] + d * r[j], b[j] + d * c[j]
+                    known = a[j] + d * (b[j] + both) + usual[j] * (path[1, i, j] - path[1, i - 1, j])
+                    s = known + variance[i]
+                    gap = k[i] - level
+                    share = 1.0 / s
+                    squared[j] += gap * gap * share
+                    product[j] *= s
+                    ga, gb = known * share, both * share
+                    x[j], r[j] = level + ga * gap, r[j] + gb * gap
+                    a[j], b[j], c[j] = known - ga * known, both - gb * known, c[j] - gb * both
+                if i % 8 == 0:  # one logarithm for several flights
+                    for j in range(shapes):
+                        logarithm[j] += np.log(product[j])
+                        product[j] = 1.0
+            for j in range(shapes):
+                spread[j], usual[j] = usual[j], max(r[j], 1e-5)
+        for j in range(shapes):
+            d = path[0, flights, j] - path[0, flights - 1, j]
+            both = b[j] + d * c[j]
+            q = spread[j] * (path[1, flights, j] - path[1, flights - 1, j])
+            found[j, way, 0], found[j, way, 1] = x[j] + d * r[j], r[j]
+            found[j, way, 2], found[j, way, 3], found[j, way, 4] = a[j] + d * (b[j] + both) + q, both, c[j]
+            found[j, way, 5] = -0.5 * (squared[j] + logarithm[j] + np.log(product[j]))
+    return found
+
+
+# --- remaining life: the flights until k first crosses its threshold, as a distribution -------------------------------
 
 _MORE = 4  # times as many are drawn as are kept
 _LEAST_RATE = 1e-5  # of k in a flight; what wears less is not told from what wears nothing

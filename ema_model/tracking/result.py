@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ema_model.text import InWords
-from ema_model.tracking.flight import Flight
+from ema_model.tracking.flights import Flight
 from ema_model.tracking.remaining import Remaining
 
 Array = NDArray[np.float64]

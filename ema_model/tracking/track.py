@@ -13,11 +13,10 @@ from ema_model.errors import InputError, did_you_mean, quoted
 from ema_model.estimation.unknowns import ECCENTRICITY
 from ema_model.quantities.numbers import HALF_90, check_number
 from ema_model.tracking.evidence import LEAST_FLIGHTS, LONGEST, MISFIT_SHARE, MISFIT_WINDOW, WORN_BEFORE
-from ema_model.tracking.flight import Flight
-from ema_model.tracking.remaining import remaining
+from ema_model.tracking.flights import Flight
+from ema_model.tracking.remaining import Wear, remaining, wear
 from ema_model.tracking.result import FaultTrack, Jump, Tracked
 from ema_model.tracking.series import Series
-from ema_model.tracking.wear import Wear, wear
 
 Array = NDArray[np.float64]
 

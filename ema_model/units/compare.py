@@ -13,6 +13,7 @@ from ema_model.actuator.naming import on_axes, path_inside
 from ema_model.actuator.parameters import low_limit
 from ema_model.errors import InputError, quoted
 from ema_model.estimation import default_free
+from ema_model.estimation.problem import SIGNALS
 from ema_model.quantities.numbers import HALF_90
 from ema_model.recordings import Measurement
 from ema_model.recordings.read import check_same_actuator, prepared
@@ -22,9 +23,36 @@ from ema_model.units.block import linearised as linearised_at
 from ema_model.units.criteria import MISFIT, REFUSED, REFUSED_SHARE, SLOPE, TOLD, UNTOLD
 from ema_model.units.fit import Fitted, Together, fit, together
 from ema_model.units.pool import Pair, Pool
-from ema_model.units.result import Alone, Difference, Need, OfRecording, OfType, UnitsCompared
+from ema_model.units.result import Alone, Difference, Need, OfRecording, OfType, Transfer, UnitsCompared
 from ema_model.units.select import alike
-from ema_model.units.transfer import transfer
+
+# --- the model of each unit on the recordings of each other one -------------------------------------------------------
+
+
+def transfer(fits: Sequence[Fitted]) -> Transfer:
+    """All models beside one unit's recordings are one population; the recordings start as their own unit's fit says."""
+    count = len(fits)
+    signal = next(name for name in SIGNALS if all(name in one.unit.model.windows[0].measured for one in fits))
+    error, floors, floor = np.zeros((count, count)), np.zeros((count, count)), np.zeros(count)
+    for place, one in enumerate(fits):
+        problem = one.unit.problem
+        problem.reweighted(one.unit.floors)
+        at = np.repeat(one.calibration.x[None, :], count, axis=0)
+        parameters = len(one.unit.parameters)
+        at[:, :parameters] = [other.calibration.x[:parameters] for other in fits]
+        residuals = problem.residuals(problem.clip(at))[:, : problem.values]
+        floors[:, place] = one.over_floor(residuals)
+        parts = [part for part in problem.parts() if part[1] == signal]
+        size = [problem.over_sigma(i, name, np.ones(rows.stop - rows.start)) for i, name, rows in parts]
+        squares = [np.sum((residuals[:, rows] / over) ** 2, axis=1) for (_, _, rows), over in zip(parts, size)]
+        values = sum(len(over) for over in size)
+        error[:, place] = np.sqrt(np.sum(squares, axis=0) / values)
+        own = [one.floors[i].sigma(signal) ** 2 for i, _, _ in parts]
+        floor[place] = np.sqrt(np.sum(np.concatenate(own)) / values)
+    return Transfer(signal, error, floor, floors)
+
+
+# --- compares the units of one type: each calibrated alone, then all together, what was held out looked at last -------
 
 Array = NDArray[np.float64]
 Progress = Callable[[str], None]

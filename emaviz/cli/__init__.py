@@ -12,8 +12,7 @@ from pathlib import Path
 from ema_model.members import names
 
 # Whatever takes time is imported where an interrupt ends the program as it should.
-from emaviz.cli.exit_code import ExitCode
-from emaviz.cli.interrupt import until_interrupted
+from emaviz.cli.ending import ExitCode, until_interrupted
 
 COMMANDS = tuple(names("emaviz.cli.verbs"))
 _WITHOUT_COMMAND = ("-h", "--help", "--version")
@@ -24,7 +23,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Runs one command; returns the exit code.  Without arguments it is the program, which an interrupt ends."""
     if arguments is not None:
         return _run(list(arguments))
-    from emaviz.cli.streams import open_closed, until_unwritable
+    from emaviz.cli.ending import open_closed, until_unwritable
 
     open_closed()
     return until_interrupted(lambda: until_unwritable(_program, _say))

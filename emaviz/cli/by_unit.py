@@ -13,8 +13,7 @@ from typing import Any
 from ema_model.actuator import Actuator
 from ema_model.comparison.summary import plain
 from ema_model.errors import InputError, did_you_mean, quoted
-from ema_model.files.limits import FILE_BYTES
-from ema_model.files.opened import listed
+from ema_model.files.opened import FILE_BYTES, listed
 from ema_model.recordings import Measurement, read_header
 from ema_model.recordings.recording_set import RUN, held_out, is_pattern
 from ema_model.units.folders import check_same_type

@@ -14,7 +14,7 @@ from typing import Any, TypeVar
 from ema_model.actuator import Actuator, save_actuator
 from ema_model.errors import InputError
 from emaviz.cli import given, output
-from emaviz.cli.exit_code import ExitCode
+from emaviz.cli.ending import ExitCode
 
 Write = Callable[[str, Mapping[str, Any]], None]  # a file's path, and the options that the answer was computed with
 

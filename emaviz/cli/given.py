@@ -27,7 +27,6 @@ from ema_model.recordings.recording_set import (
     long_enough,
     runs_of,
 )
-from ema_model.simulation.load_profile import LoadProfile
 from emaviz.cli.options import COMMAND_OR_FILE
 from emaviz.cli.output import Progress
 
@@ -227,7 +226,7 @@ def weights_of(texts: list[str] | None) -> dict[str, float] | None:
 def run_of(arguments: argparse.Namespace, actuator: Actuator, sample_rate_Hz: float = 10_000.0) -> Run:
     """The run that the options ask for."""
     demand, length = _command(arguments, actuator)
-    from ema_model.simulation.run import Run  # takes a second: a wrong command is refused before
+    from ema_model.simulation.run import LoadProfile, Run  # takes a second: a wrong command is refused before
 
     duration = arguments.duration if arguments.duration is not None else length
     load = LoadProfile(arguments.load_shape, arguments.load_time, arguments.load_frequency)

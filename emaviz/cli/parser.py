@@ -16,8 +16,8 @@ from typing import Any, NoReturn
 import emaviz
 from ema_model.errors import InputError, did_you_mean, quoted
 from emaviz.cli import COMMANDS
-from emaviz.cli.exit_code import EXIT_CODES
-from emaviz.cli.files import check_files
+from emaviz.cli.ending import EXIT_CODES
+from emaviz.cli.options import check_files
 
 
 class Parser(argparse.ArgumentParser):

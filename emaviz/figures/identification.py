@@ -14,9 +14,8 @@ from numpy.typing import ArrayLike, NDArray
 from ema_model.actuator import Actuator
 from ema_model.actuator.readings import between, sentences
 from ema_model.faults import FAULTS, HEALTHY, NAMES
-from ema_model.identification.objective import Objective
 from ema_model.identification.run import ROBUST, algorithm_title
-from ema_model.identification.search import Landscape
+from ema_model.identification.search import Landscape, Objective
 from ema_model.quantities.axes import Axes
 from ema_model.quantities.numbers import number
 from ema_model.recordings import Measurement

@@ -9,7 +9,7 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.compute
 
-from ema_model.files.limits import ARRAYS
+from ema_model.files.opened import ARRAYS
 from ema_model.recordings.formats.channels import Channel, Log, NoLog
 from ema_model.recordings.formats.json import decoded, numbers_of_records
 

@@ -1,32 +1,31 @@
-"""The app: builds the page and joins it to the session."""
+"""The app in a browser: a tab for each analysis, the actuator, keys, playback."""
 
 from __future__ import annotations
 
 import argparse
+import importlib
 import sys
 import threading
 import time
 import webbrowser
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import viser
 
 from ema_model.actuator import load_actuator
+from ema_model.members import classes_in, members
 from ema_model.simulation import plant
 from emaviz.page import compare, explore
 from emaviz.page.charts import add_chart_tools
 from emaviz.page.docked import LEFT_PX, Docked
 from emaviz.page.explore.tab import ExploreTab
-from emaviz.page.keys import add_keys
-from emaviz.page.members import tabs
 from emaviz.page.page import Page
+from emaviz.page.panel import follow_theme
 from emaviz.page.playback import PlaybackStrip
-from emaviz.page.standing import Standings
-from emaviz.page.tab import AnyTab, Shared
-from emaviz.page.viewer_links import follow_theme
-from emaviz.page.workspaces import Workspaces
+from emaviz.page.tab import AnyTab, Shared, Standings, Tab
+from emaviz.page.workspaces import Workspace, Workspaces
 from emaviz.recording.viewer import ViewerHost
 from emaviz.scene.actuator import ActuatorScene
 from emaviz.server.door import Door
@@ -39,6 +38,67 @@ from emaviz.session.data_folder import DataFolder
 from emaviz.session.discover.discovering import Discovering
 from emaviz.session.session import Session
 from emaviz.session.worker import Worker, report
+
+# --- finds the tabs: every file here that states a `WORKSPACE` and defines its tab, or folder whose `tab.py` does -----
+
+
+def tabs() -> list[type[Tab]]:
+    """In their order."""
+    found: list[type[Tab]] = []
+    for name in members("emaviz.page", "WORKSPACE", files=True, folders=True):
+        module = importlib.import_module(f"emaviz.page.{name}")
+        if hasattr(module, "__path__"):
+            module = importlib.import_module(f"emaviz.page.{name}.tab")
+        found += classes_in(module, Tab)
+    return sorted(found, key=lambda one: one.workspace.place)
+
+
+# --- keys -------------------------------------------------------------------------------------------------------------
+# Space plays, arrows step, digits change workspaces, Ctrl+Z takes a slider back; ? lists them as commands.
+
+_MOST_DIGITS = 9
+# viser's commands take no `?`, which here presses its own Ctrl+K; and an arrow that moves a focused slider or changes a
+# tab is not to be a step as well.
+_SCRIPT = """
+(() => {
+  window.emavizKeys?.();
+  const typing = (at) => at.closest?.('input, textarea, select, [contenteditable=true]');
+  const down = (event) => {
+    if (event.key.startsWith('Arrow') && event.target.closest?.('[role=slider], [role=tab], [role=option]'))
+      event.stopPropagation();
+    if (event.key !== '?' || event.ctrlKey || event.metaKey || event.altKey || typing(event.target)) return;
+    event.preventDefault();
+    event.stopPropagation();
+    const press = { key: 'k', code: 'KeyK', ctrlKey: true, bubbles: true, cancelable: true };
+    document.body.dispatchEvent(new KeyboardEvent('keydown', press));
+  };
+  document.body.addEventListener('keydown', down);
+  window.emavizKeys = () => document.body.removeEventListener('keydown', down);
+})();
+"""
+
+
+def add_keys(page: Page, strip: PlaybackStrip, members: list[Workspace], undo: Callable[[], None]) -> None:
+    """Registers them; in a field one types, and they do nothing.  undo(): on the screen's thread."""
+    gui, post = page.server.gui, page.screen.post
+    play = gui.add_command("Play or pause", hotkey="space", icon=viser.Icon.PLAYER_PLAY)
+    play.on_trigger(lambda _: post("play", lambda: strip.play(not strip.playback.playing)))
+    for title, key, steps, icon in (
+        ("One step on", "arrowright", 1, viser.Icon.PLAYER_TRACK_NEXT),
+        ("One step back", "arrowleft", -1, viser.Icon.PLAYER_TRACK_PREV),
+    ):
+        command = gui.add_command(title, hotkey=cast(Any, key), icon=icon)
+        command.on_trigger(lambda _, steps=steps: post("step", lambda: strip.step(steps)))
+    for digit, one in enumerate(members[:_MOST_DIGITS], 1):
+        command = gui.add_command(f"Go to {one.title}", hotkey=cast(Any, str(digit)), icon=one.icon)
+        command.on_trigger(lambda event, name=one.name: page.workspaces.go(name, event.client))
+    back = gui.add_command("Undo on Explore", hotkey="Z", modifier="cmd/ctrl", icon=viser.Icon.ARROW_BACK_UP)
+    back.on_trigger(lambda _: post("undo", undo))
+    gui.add_command("List these keys: ?", icon=viser.Icon.KEYBOARD)
+    Inside(page.server).run(_SCRIPT)
+
+
+# --- the app: builds the page and joins it to the session -------------------------------------------------------------
 
 _FASTEST_REDRAW_S = 0.04
 _SLOW_REDRAW_S = 0.3  # of what nobody watches while dragging

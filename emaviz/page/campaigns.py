@@ -13,7 +13,7 @@ from ema_model.errors import InputError
 from ema_model.recordings import Measurement
 from emaviz.page.page import Page
 from emaviz.page.panel import JobLine
-from emaviz.page.standing import Standing
+from emaviz.page.tab import Standing
 from emaviz.session.campaigns import Campaigns
 from emaviz.session.inputs import Provenance
 from emaviz.session.worker import Worker

@@ -1,4 +1,4 @@
-"""The panels on the right, of which each window sees one; what they and the left one leave is the actuator's."""
+"""How a window is laid out: the panels on the right, and the actuator as an inset."""
 
 from __future__ import annotations
 
@@ -7,6 +7,9 @@ import threading
 import viser
 
 from emaviz.server.viser_private import Inside
+from emaviz.text.html import Html, unescaped
+
+# --- the panels on the right, of which each window sees one; what they and the left one leave is the actuator's -------
 
 LEFT_PX = 380
 _USUAL_WINDOW_PX = 1400
@@ -76,3 +79,122 @@ class Docked:
 def _width_px(window_px: int, share: float) -> int:
     """Of a panel."""
     return round(min(max(share * (window_px - LEFT_PX), _NARROWEST_PX), _WIDEST_PX))
+
+
+# --- the actuator as a framed inset below the controls, so that results have the page's width; a click lets it --------
+# The actuator as a framed inset below the controls, so that results have the page's width; a click lets it grow
+# Each window lays itself out: a script there follows its workspace, and everything else is a style sheet.  It leans on
+# names in viser's own page; where one has changed, the actuator stands between the panels as it does once it has grown.
+
+COLUMNS = Html('<div class="emaviz-columns"></div>')  # stands in a tab whose parts take two columns where there is room
+NEXT_COLUMN = Html('<div class="emaviz-next-column"></div>')  # stands in the folder that begins the second one
+ALL_COLUMNS = Html('<div class="emaviz-all-columns"></div>')  # stands in a folder that is as wide as both
+# Stands before what gives way to the second column where there is one only.
+PLOTS_EARLY = Html('<div class="emaviz-early"></div>')
+ROOM = Html('<div class="emaviz-room"></div>')  # stands in a folder that only a large window has room for
+_ROOM_PX = 1700, 940  # of such a window, width and height
+_LEAST_WIDTH_PX = 900  # of a window
+_STRIP_PX = 76  # of the playback below
+_CLICK_PX = 4  # a pointer that moves further turns the actuator
+
+_SCRIPT = """
+(() => {
+  window.emavizInset?.end();
+  let asked = false, low = false, grown = false, down = null;
+  const root = document.documentElement, body = document.body, button = document.createElement('button');
+  button.className = 'emaviz-grow';
+  body.append(button);
+  const picture = () => document.querySelector('[data-dock-root] > div:has(> canvas)');
+  const dress = () => {
+    const at = picture(), left = document.querySelector('[data-dock-region=left]');
+    const both = ['left', 'right'].every(side => document.querySelector(`[data-dock-region-resize=${side}]`));
+    const can = asked && at && left && both && innerWidth >= LEAST, inset = can && !grown;
+    if (left) root.style.setProperty('--emaviz-left', `${left.getBoundingClientRect().width}px`);
+    body.classList.toggle('emaviz-inset', inset);
+    body.classList.toggle('emaviz-low-inset', inset && low);
+    button.style.display = can ? 'block' : 'none';
+    if (at) {  // what is told stands on the picture, beside the button
+      const box = at.getBoundingClientRect(), above = inset ? 6 : 52;
+      const note = { left: box.left + 6, top: box.top + above, width: Math.min(box.width - (inset ? 50 : 12), 440),
+                     height: (inset ? box.height : Math.min(box.height, innerHeight - STRIP)) - above - 6 };
+      for (const [side, px] of Object.entries(note)) root.style.setProperty(`--emaviz-note-${side}`, `${px}px`);
+    }
+    if (!can) return;
+    const box = at.getBoundingClientRect();
+    button.style.left = `${box.right - 34}px`;
+    button.style.top = `${box.top + (inset ? 6 : 22)}px`;
+    button.textContent = inset ? '⤢' : '⤡';
+    button.title = inset ? 'Larger actuator' : 'Smaller actuator';
+    button.setAttribute('aria-label', button.title);
+  };
+  const grow = (to) => { grown = to; dress(); };
+  const pressed = (event) => {
+    down = body.classList.contains('emaviz-inset') && picture()?.contains(event.target) ? event : null;
+  };
+  const released = (event) => {
+    if (down && Math.hypot(event.clientX - down.clientX, event.clientY - down.clientY) < CLICK) grow(true);
+    down = null;
+  };
+  button.addEventListener('click', () => grow(!grown));
+  document.addEventListener('pointerdown', pressed, true);
+  document.addEventListener('pointerup', released, true);
+  const timer = setInterval(dress, 100);
+  window.emavizInset = {
+    enter: (inset, lower) => { asked = inset; low = lower; grown = false; dress(); },
+    end: () => {
+      clearInterval(timer);
+      button.remove();
+      document.removeEventListener('pointerdown', pressed, true);
+      document.removeEventListener('pointerup', released, true);
+    },
+  };
+})();
+"""
+
+
+def script() -> str:
+    """To run in every page: `window.emavizInset.enter(inset, lower)` lays it out for a workspace."""
+    return (
+        _SCRIPT.replace("LEAST", str(_LEAST_WIDTH_PX)).replace("CLICK", str(_CLICK_PX)).replace("STRIP", str(_STRIP_PX))
+    )
+
+
+def style() -> Html:
+    """The inset at the lower left, the controls above it, the results to the right of both."""
+    inset, right = "body.emaviz-inset", "body.emaviz-inset [data-dock-region=right]"
+    any_columns = "div:has(> div > .emaviz-columns)"
+    columns, room = f"{right} {any_columns}", "> div:has(.emaviz-room)"
+    wide, high = _ROOM_PX
+    return unescaped(
+        "<style>"
+        ":root{--emaviz-inset:clamp(150px,calc(46vh - 138px),330px)}"
+        "body.emaviz-low-inset{--emaviz-inset:clamp(130px,calc(46vh - 138px),180px)}"
+        f"{inset} [data-dock-root] > div:has(> canvas){{inset:auto auto 8px 8px!important;"
+        "width:calc(var(--emaviz-left) - 16px)!important;height:var(--emaviz-inset)!important;z-index:6;"
+        "border:1px solid rgba(134,142,150,.55);border-radius:6px;overflow:hidden;cursor:pointer}"
+        f"{inset} [data-dock-region=left]{{bottom:calc(var(--emaviz-inset) + 16px)!important}}"
+        f"{right}{{width:calc(100% - var(--emaviz-left))!important}}"
+        f"{right} > div:not([data-dock-region-handle]):not([data-dock-region-resize]) > div{{width:100%!important}}"
+        f"{right} [data-dock-region-resize]{{display:none!important}}"
+        # what is told, where it covers no control and no result
+        ".mantine-Notifications-root{left:var(--emaviz-note-left,10px)!important;right:auto!important;"
+        "top:var(--emaviz-note-top,80px)!important;bottom:auto!important;width:var(--emaviz-note-width,300px)!important;"
+        "max-height:var(--emaviz-note-height,50vh);overflow-y:auto}"
+        # a control's hint stands beside the panel, on the control's height: it covers no other control
+        "body:has([data-dock-region=left]:hover) .mantine-Tooltip-tooltip[style*='15rem']"
+        "{left:calc(var(--emaviz-left,400px) + 8px)!important}"
+        ".emaviz-grow{position:fixed;z-index:7;width:26px;height:26px;padding:0;border-radius:4px;cursor:pointer;"
+        "font-size:15px;line-height:24px;border:1px solid rgba(134,142,150,.55);"
+        "background:var(--mantine-color-body);color:var(--mantine-color-text)}"
+        f"@media (min-width:{TWO_COLUMNS_PX}px){{{columns}{{columns:2;column-gap:6px;padding-top:12px}}"
+        f"{columns} > div{{break-inside:avoid}}"
+        f"{columns} > div:has(.emaviz-next-column){{break-before:column}}"
+        f"{columns} > div:has(.emaviz-all-columns){{column-span:all}}}}"
+        f"{any_columns} {room}{{display:none}}"
+        f"@media (min-width:{wide}px) and (min-height:{high}px){{{columns} {room}{{display:block}}}}"
+        f"@media (max-width:{TWO_COLUMNS_PX - 1}px){{{columns}:has(> div > .emaviz-early)"
+        "{display:flex;flex-direction:column}"
+        f"{columns} > div:has(> .emaviz-early) ~ div{{order:2}}"
+        f"{columns} > div:has(> .emaviz-early) ~ div:has(.emaviz-next-column){{order:1}}}}"
+        "</style>"
+    )

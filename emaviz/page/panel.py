@@ -1,4 +1,4 @@
-"""What tabs share: a job's line, files that stay, ways on."""
+"""What tabs share: a job's line, files that stay, ways on, links to the viewer."""
 
 from __future__ import annotations
 
@@ -12,16 +12,56 @@ import viser
 from ema_model.text import InWords
 from emaviz.page.page import Page
 from emaviz.page.style import IN_ROW
-from emaviz.page.viewer_links import recording_link
 from emaviz.recording.viewer import ViewerHost
+from emaviz.server.viser_private import Inside
 from emaviz.session.data_folder import DataFolder
 from emaviz.session.files import Practice
 from emaviz.session.inputs import Provenance
-from emaviz.session.job import Job
-from emaviz.session.signal import Signal
+from emaviz.session.worker import Job, Signal
 from emaviz.text.html import BOX, Html, add_html, boxed, html, joined
 from emaviz.text.results import begun, large, warned
 from emaviz.text.time_left import going_on
+
+# --- links to the Rerun viewer: a tab of its own is as light or dark as the page is when they are pressed -------------
+
+LINK = "emaviz-viewer"  # their class
+# Without it the viewer follows the system's theme.  A link is told on its way, so that what was drawn before the page
+# changed is right as well: before a press of any button, of which one opens a tab and one a menu, or of Enter.
+_SCRIPT = """
+(() => {
+  window.emavizLinks?.();
+  const told = (event) => {
+    const link = event.target.closest?.('a.LINK');
+    if (!link) return;
+    const address = new URL(link.href);
+    const dark = document.documentElement.dataset.mantineColorScheme === 'dark';
+    address.searchParams.set('theme', dark ? 'dark' : 'light');
+    link.href = address;
+  };
+  const kinds = ['pointerdown', 'click'];
+  for (const kind of kinds) document.addEventListener(kind, told, true);
+  window.emavizLinks = () => { for (const kind of kinds) document.removeEventListener(kind, told, true); };
+})();
+"""
+
+
+def follow_theme(inside: Inside) -> None:
+    """In every page that is or will be open."""
+    inside.run(_SCRIPT.replace("LINK", LINK))
+
+
+def recording_link(viewer: ViewerHost | None, path: Path, text: str = "") -> Html:
+    """A link that opens a recording in the Rerun viewer, or its name where there is none."""
+    if viewer is None:
+        return html('<div style="padding:2px 10px;font-size:13px">{}</div>', path.name)
+    return html(
+        '<div style="padding:2px 10px;font-size:13px;overflow-wrap:anywhere"><a class="{}" href="{}" '
+        'target="_blank" rel="noopener">{}</a></div>',
+        LINK,
+        viewer.url_of(path.name),
+        text or f"Open {path.name} in Rerun ↗",
+    )
+
 
 # --- what a long run says of itself: how far it is, what came of it, and the buttons that pause and stop it -----------
 

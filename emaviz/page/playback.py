@@ -17,10 +17,9 @@ from emaviz.page.page import Page
 from emaviz.page.style import STRIP, caption, figures
 from emaviz.page.style import page as style
 from emaviz.scene.actuator import ActuatorScene
-from emaviz.scene.motion import Motion
-from emaviz.scene.playback import SPEEDS, Playback
-from emaviz.session.described import checked, limits, setting, taken
-from emaviz.session.signal import Signal
+from emaviz.scene.playback import SPEEDS, Motion, Playback
+from emaviz.session.settings import checked, limits, setting, taken
+from emaviz.session.worker import Signal
 from emaviz.text.html import add_html
 
 _SLOWEST_STEP_S = 1e-4

@@ -18,15 +18,15 @@ from ema_model.recordings import SIGNALS, Measurement
 from emaviz.figures import comparison, runs
 from emaviz.figures.identification import named
 from emaviz.page.campaigns import CampaignControls
-from emaviz.page.inset import COLUMNS
+from emaviz.page.docked import COLUMNS
 from emaviz.page.page import Page
+from emaviz.page.panel import recording_link
 from emaviz.page.tab import Shared, Tab
-from emaviz.page.viewer_links import recording_link
 from emaviz.page.workspaces import Workspace
 from emaviz.recording.entry import Entry, error_said, setting
 from emaviz.recording.read import Recording
 from emaviz.recording.viewer import ViewerHost
-from emaviz.scene.motion import motion
+from emaviz.scene.playback import motion
 from emaviz.session import saved as session_file
 from emaviz.session.compare import Comparing
 from emaviz.session.data_folder import SESSION_SUFFIX

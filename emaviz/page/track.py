@@ -13,7 +13,7 @@ from ema_model.errors import InputError
 from ema_model.faults import BY_NAME
 from ema_model.quantities.titles import in_sentence
 from ema_model.text import COLOURS
-from ema_model.tracking.flight import Flight
+from ema_model.tracking.flights import Flight
 from ema_model.tracking.history import History
 from ema_model.tracking.result import Tracked
 from ema_model.tracking.track import TRACKED
@@ -21,7 +21,7 @@ from ema_model.tracking.words import headline, hindsight
 from emaviz.figures import tracking
 from emaviz.figures.tracking import CLICKED
 from emaviz.page.compare import WORKSPACE as COMPARE
-from emaviz.page.inset import COLUMNS, NEXT_COLUMN
+from emaviz.page.docked import COLUMNS, NEXT_COLUMN
 from emaviz.page.page import Page
 from emaviz.page.panel import (
     RECORD,
@@ -35,9 +35,8 @@ from emaviz.page.panel import (
     PracticeButtons,
     Seal,
 )
-from emaviz.page.standing import Standing
 from emaviz.page.style import LONG_LABELS, unseen_field
-from emaviz.page.tab import Shared, Tab
+from emaviz.page.tab import Shared, Standing, Tab
 from emaviz.page.workspaces import Workspace
 from emaviz.recording.viewer import ViewerHost
 from emaviz.server.viser_private import Inside, id_of

@@ -12,13 +12,12 @@ from numpy.typing import NDArray
 from ema_model import faults
 from ema_model.actuator.readings import between, sentences
 from ema_model.commands import Recorded
-from ema_model.identification.objective import Objective
 from ema_model.identification.run import Identification, Progress, algorithm_title
+from ema_model.identification.search import Objective
 from ema_model.identification.words import facts, in_one_line, verdict, why_best
 from ema_model.quantities.numbers import amount
 from ema_model.recordings import Measurement
-from ema_model.simulation.load_profile import RecordedLoad
-from ema_model.simulation.run import Run, simulate_monitor
+from ema_model.simulation.run import RecordedLoad, Run, simulate_monitor
 from emaviz.recording.writer import RecordingWriter
 
 _RESIDUAL = ("current_A", "user_position_rad", "motor_position_rad", "motor_speed_rad_s")

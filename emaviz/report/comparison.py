@@ -21,8 +21,7 @@ from ema_model.comparison.words import (
 from ema_model.estimation.calibrate import calibration_table, convergence, warnings
 from ema_model.quantities.numbers import number
 from ema_model.quantities.variables import VARIABLES, variable_title
-from ema_model.recordings.health.card import Health
-from ema_model.recordings.health.finding import MARKS
+from ema_model.recordings.health import MARKS, Health
 from emaviz.figures import campaign, comparison
 from emaviz.figures import comparison as comparison_figures
 from emaviz.figures.comparison import time_ranges

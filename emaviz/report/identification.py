@@ -12,8 +12,8 @@ import plotly.graph_objects as go
 from ema_model import faults
 from ema_model.actuator.naming import on_axes
 from ema_model.actuator.readings import readings, sentences
-from ema_model.identification.objective import Objective
 from ema_model.identification.run import Identification, algorithm_title
+from ema_model.identification.search import Objective
 from ema_model.identification.words import CORRECTED, verdict
 from ema_model.quantities.numbers import amount, number
 from emaviz import __version__

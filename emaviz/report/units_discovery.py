@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from ema_model.units.discovery.result import UnitsDiscovered
-from ema_model.units.discovery.words import headline
+from ema_model.units.discovery import UnitsDiscovered, headline
 from emaviz.report.page import Figures, Section, WordsSection, page, write
 from emaviz.report.units import TransferMatrix, UnitParameters
 

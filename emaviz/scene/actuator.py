@@ -496,7 +496,7 @@ _MOST_PLACED = 20  # places of a camera that are remembered
 
 
 class Machine:
-    """Motor, drivetrain and labels as they are drawn; what they enlarge is `emaviz.scene.motion`'s matter."""
+    """Motor, drivetrain and labels as they are drawn; what they enlarge is `emaviz.scene.playback`'s matter."""
 
     def __init__(self, owner: viser.ViserServer | viser.ClientHandle, pole_pairs: int, root: str = "") -> None:
         """owner: the server, whose windows share it, or the window that has it alone."""

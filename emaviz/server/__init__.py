@@ -1,5 +1,5 @@
 """What stands between a browser and the app: who may come in, and what may be said.
 
-door: who gets an answer; policy: what the page may do there; messages, values: what a page can mean;
-gate: lets that through; complaints: one line about the rest; viser_private: the inside of viser that this needs.
+door: who gets an answer, what the page may do there, and one line about the rest; messages: what a page can mean;
+safe_server: the server that holds to it; uploads: files; viser_private: the inside of viser that this needs.
 """

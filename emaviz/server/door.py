@@ -1,11 +1,15 @@
-"""Who may ask for the page."""
+"""Who may ask for the page, and what is said of those who may not."""
 
 from __future__ import annotations
 
 import asyncio
 import hmac
+import logging
 import re
 import secrets
+import sys
+import threading
+import time
 from collections.abc import Awaitable, Callable, Sequence
 from ipaddress import ip_address
 from typing import Any
@@ -20,9 +24,51 @@ from ema_model.errors import InputError
 from ema_model.files.opened import shown
 from emaviz.server import messages
 from emaviz.server.beside import say_beside
-from emaviz.server.complaints import Complaints
 from emaviz.server.messages import Refused, checked
 from emaviz.server.viser_private import Inside
+
+# --- what nobody honest sends costs one line on stderr, and a flood of it a few lines a minute ------------------------
+
+_LINES = 10  # of one period; what comes beyond is counted
+_PERIOD_S = 60.0
+_LENGTH = 300  # characters
+
+
+class Complaints(logging.Handler):
+    """Says a line on stderr, as a function and as the handler of a library's log."""
+
+    def __init__(self) -> None:
+        super().__init__(logging.WARNING)
+        self._counting = threading.Lock()
+        self._began, self._said, self._unsaid = 0.0, 0, 0
+
+    def __call__(self, text: object) -> None:
+        """One line, whatever `text` holds; nothing when this period's lines are used up."""
+        with self._counting:
+            now = time.monotonic()
+            if now - self._began > _PERIOD_S:
+                self._began, self._said = now, 0
+            if self._said == _LINES:
+                self._unsaid += 1
+                return
+            self._said += 1
+            more, self._unsaid = self._unsaid, 0
+        tail = f" (and {more} more before it)" if more else ""
+        print(f"emaviz: {shown(text, _LENGTH)}{tail}", file=sys.stderr, flush=True)
+
+    def emit(self, record: logging.LogRecord) -> None:
+        """A record without its traceback."""
+        error = record.exc_info[1] if record.exc_info else None
+        if isinstance(error, RuntimeError) and "after shutdown" in str(error):
+            return  # a browser that was still there when the app ended
+        self(record.getMessage() + (f": {error or type(error).__name__}" if error is not None else ""))
+
+    def log(self) -> logging.Logger:
+        """A log of its own, all of whose warnings and errors come here."""
+        logger = logging.Logger("emaviz.server", logging.WARNING)
+        logger.addHandler(self)
+        return logger
+
 
 # --- what the page may do in the browser: speak to its own server, and show the Rerun viewer's page -------------------
 

@@ -17,8 +17,7 @@ from typing import Any
 import viser
 
 from ema_model.errors import InputError
-from ema_model.files.limits import FILE_BYTES, PAGE_BYTES, megabytes
-from ema_model.files.opened import shown
+from ema_model.files.opened import FILE_BYTES, PAGE_BYTES, megabytes, shown
 from ema_model.recordings.formats import FORMATS
 from emaviz.server.viser_private import Inside, TransferPart, TransferStart, id_of
 from emaviz.session.data_folder import DataFolder, sanitised

@@ -17,14 +17,13 @@ from ema_model.comparison import compare
 from ema_model.discovery import discover
 from ema_model.errors import InputError
 from ema_model.files.opened import shown
-from ema_model.identification.objective import Objective
 from ema_model.identification.run import Progress, identify
+from ema_model.identification.search import Objective
 from ema_model.recordings import Measurement
 from emaviz.session.data_folder import DataFolder
 from emaviz.session.inputs import Inputs, digest, version_of
-from emaviz.session.job import Job, Tell
 from emaviz.session.session import Session
-from emaviz.session.signal import Signal
+from emaviz.session.worker import Job, Signal, Tell
 
 _HEADER = "campaign.json"
 _DEPTHS = ("*", "*/*")  # below the data folder

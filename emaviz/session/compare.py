@@ -19,13 +19,11 @@ from ema_model.recordings.formats.text_layout import Hints
 from ema_model.recordings.side_file import SideFile
 from emaviz.session import files
 from emaviz.session.data_folder import DataFolder
-from emaviz.session.described import number
 from emaviz.session.files import Opened, all_measured, guesses, measured, read_opened, side_file_of, side_with
 from emaviz.session.inputs import Inputs, Provenance, digest, listed, version_of, version_with_side
-from emaviz.session.job import Job, Tell
 from emaviz.session.session import Session
-from emaviz.session.signal import Signal
-from emaviz.session.worker import Worker, report
+from emaviz.session.settings import number
+from emaviz.session.worker import Job, Signal, Tell, Worker, report
 
 # --- what the screen listens to of Compare ----------------------------------------------------------------------------
 

@@ -17,22 +17,19 @@ from ema_model.actuator.parameters import facts_of
 from ema_model.actuator.reference import usual_tolerance
 from ema_model.challenges import Challenge
 from ema_model.errors import InputError, quoted
-from ema_model.files.limits import PAGE_BYTES
-from ema_model.files.opened import shown
-from ema_model.files.shipped import shipped_folder
+from ema_model.files.opened import PAGE_BYTES, shipped_folder, shown
 from ema_model.practice import challenge_in, make, reveal, shipped
 from ema_model.practice.kinds.kind import Revealed
 from ema_model.quantities.axes import Axes
 from ema_model.recordings import ColumnMapping, Measurement, hints_of, prepared, read_columns, read_head, read_side_file
 from ema_model.recordings.formats.text_layout import Head, Hints
-from ema_model.recordings.health.card import Health, health_of
+from ema_model.recordings.health import Health, health_of
 from ema_model.recordings.read import how_to_read, recorded
 from ema_model.recordings.side_file import SideFile, find_side_file
 from ema_model.text import InWords
 from emaviz.session.data_folder import ACTUATOR_SUFFIX, DataFolder
 from emaviz.session.inputs import digest, version_of
-from emaviz.session.job import Job, Run
-from emaviz.session.signal import Signal
+from emaviz.session.worker import Job, Run, Signal
 
 # --- a recording that is chosen for Compare: its table, its mapping, and what was measured ----------------------------
 

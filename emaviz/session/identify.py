@@ -17,19 +17,15 @@ from ema_model.actuator import Actuator
 from ema_model.errors import InputError
 from ema_model.faults import NAMES, performance_coefficient
 from ema_model.identification.fit import CorrectedError
-from ema_model.identification.objective import Objective
 from ema_model.identification.run import SEARCH_SHARE, Identification, Progress, by_one_error, steps
-from ema_model.identification.search import Landscape, Way, extent, slices, ways
+from ema_model.identification.search import Landscape, Objective, Way, extent, slices, ways
 from ema_model.identification.words import in_one_line, landscape_words
 from ema_model.quantities.numbers import amount
 from ema_model.recordings import Measurement
 from ema_model.simulation import plant
-from emaviz.session.described import title
 from emaviz.session.inputs import Inputs, Provenance
-from emaviz.session.job import Job, Run
-from emaviz.session.settings import SLIDERS, Settings
-from emaviz.session.signal import Signal
-from emaviz.session.worker import Steps, Worker
+from emaviz.session.settings import SLIDERS, Settings, title
+from emaviz.session.worker import Job, Run, Signal, Steps, Worker
 
 if TYPE_CHECKING:
     from emaviz.recording.story import IdentificationStory

@@ -1,4 +1,4 @@
-"""A session as one file: parts, archive."""
+"""A session as one file: recorded runs, parts, archive."""
 
 from __future__ import annotations
 
@@ -12,18 +12,85 @@ from datetime import datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from ema_model.discovery.words import effect_title
 from ema_model.errors import InputError, quoted
-from ema_model.files.limits import SESSION_BYTES, SESSION_FILES, SETTINGS_BYTES
-from ema_model.files.opened import Damaged, Refused, SafeZip, check_user_file, opened_zip, shown
+from ema_model.files.opened import (
+    SESSION_BYTES,
+    SESSION_FILES,
+    SETTINGS_BYTES,
+    Damaged,
+    Refused,
+    SafeZip,
+    check_user_file,
+    opened_zip,
+    shown,
+)
 from ema_model.files.written import whole_file
+from ema_model.quantities.numbers import number
+from ema_model.quantities.titles import in_sentence
 from ema_model.recordings import side_path
 from emaviz import __version__
 from emaviz.recording.entry import Entry
 from emaviz.session.data_folder import SESSION_SUFFIX, DataFolder, sanitised
-from emaviz.session.run_summary import summary
 
 if TYPE_CHECKING:
     from emaviz.recording.read import Recording
+
+
+# --- what a recorded run is, in a line: its kind and what came of it, from what its file says of itself ---------------
+
+UNKNOWN = "run"
+
+
+def summary(said: Mapping[str, Any]) -> tuple[str, str]:
+    """('discovery', 'cogging torque: 1.69 → 0.757 × floor'); ('run', '') of a file that says nothing."""
+    for key, (kind, words) in _KINDS.items():
+        if isinstance(said.get(key), Mapping):
+            try:
+                return kind, words(said[key])
+            except (KeyError, TypeError, IndexError, ValueError):  # of another version
+                return kind, ""
+    return UNKNOWN, ""
+
+
+def _identification(found: Mapping[str, Any]) -> str:
+    names = sorted({name for one in found.values() for name in one.get("alarms", ())})
+    return "not healthy: " + ", ".join(names) if names else "healthy" if _all(found, "healthy") else "no single k off"
+
+
+def _all(found: Mapping[str, Any], name: str) -> bool:
+    return all(one.get(name) for one in found.values())
+
+
+def _discovery(found: Mapping[str, Any]) -> str:
+    names = [in_sentence(effect_title(str(one["name"]))) for one in found["effects"]]
+    errors = [found["ladder"][at]["rmse"] for at in (0, -1)]
+    if None in errors:
+        fell = ""
+    elif len(found["ladder"]) > 1:
+        fell = f"{number(errors[0])} → {number(errors[1])} × floor"
+    else:
+        fell = f"{number(errors[0])} × floor"
+    what = ", ".join(names) or str(found["verdict"]).replace("_", " ")
+    return f"{what}: {fell}" if fell else what
+
+
+def _comparison(found: Mapping[str, Any]) -> str:
+    return str(found["sentences"][0])
+
+
+def _tracking(found: Mapping[str, Any]) -> str:
+    trends = [name for name, one in found["faults"].items() if one.get("trend")]
+    return f"trend of {', '.join(trends)}" if trends else "no trend"
+
+
+_KINDS: dict[str, tuple[str, Callable[[Mapping[str, Any]], str]]] = {
+    "found": ("identification", _identification),
+    "discovery": ("discovery", _discovery),
+    "comparison": ("comparison", _comparison),
+    "track": ("tracking", _tracking),
+    "reproduce": ("evaluation", lambda _: "the thesis's tables beside ours"),
+}
 
 # --- past recordings: what the folder holds, with settings and results; renamed, deleted, read back -------------------
 

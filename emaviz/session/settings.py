@@ -1,8 +1,12 @@
-"""What the page is set to.  Each setting is described once; a browser or a session's file may send anything."""
+"""What the page is set to, how each setting is described and checked, and the steps back."""
 
 from __future__ import annotations
 
-from typing import Annotated, Any
+import math
+import time
+from collections.abc import Callable, Iterable
+from functools import cache
+from typing import Annotated, Any, TypeVar, get_type_hints
 
 import msgspec
 import numpy as np
@@ -15,12 +19,105 @@ from ema_model.errors import InputError, quoted
 from ema_model.faults import HEALTHY, physical
 from ema_model.identification.run import ALGORITHMS
 from ema_model.quantities.axes import ROTARY, Axes
-from ema_model.quantities.sides import MOTOR, USER
-from ema_model.simulation.load_profile import SHAPES, LoadProfile
+from ema_model.quantities.sides import MOTOR, USER, Side
+from ema_model.recordings.measurement import Sensors
 from ema_model.simulation.plant import FITNESSES
-from ema_model.simulation.run import Run
-from ema_model.simulation.sensors import Sensors
-from emaviz.session.described import checked, number, setting
+from ema_model.simulation.run import SHAPES, LoadProfile, Run
+
+# --- settings described where they stand ------------------------------------------------------------------------------
+# What a value is called, its unit, and what it may be; checked here alone.
+
+Kind = TypeVar("Kind")
+
+
+def setting(
+    title: str,
+    low: float | None = None,
+    high: float | None = None,
+    *,
+    unit: str = "",
+    side: Side | None = None,
+    one_of: Iterable[str] = (),
+    made: Callable[[Any, Axes], Any] | None = None,
+) -> msgspec.Meta:
+    """For `Annotated[type, setting(…)]` in a Struct.
+
+    title: in a sentence; unit: on a rotary axis; one_of: all that it may be; made(value, axes): what the value becomes,
+    where a type and a range do not say it, InputError for a bad one.
+    """
+    said = {"unit": unit, "side": side, "one_of": tuple(one_of), "made": made}
+    return msgspec.Meta(title=title, ge=low, le=high, extra=said)
+
+
+def checked(kind: type[msgspec.Struct], name: str, value: Any, axes: Axes = ROTARY) -> Any:
+    """A value for the setting of that name as its type has it; one line of InputError says why not."""
+    of = _types(kind)[name]
+    about: msgspec.Meta = of.__metadata__[0]
+    said = about.extra or {}
+    if said["made"] is not None:
+        return said["made"](value, axes)
+    if said["one_of"] and value not in said["one_of"]:
+        raise InputError(f"{about.title} must be one of {', '.join(said['one_of'])}, not {quoted(value, 40)!r}")
+    try:
+        read = msgspec.convert(value, of, strict=False)
+    except msgspec.ValidationError:
+        read = math.nan
+    if isinstance(read, float) and not math.isfinite(read):
+        raise InputError(f"{about.title} must {_may(of, axes)}, not {_as_given(value)}")
+    return read
+
+
+def title(kind: type[msgspec.Struct], name: str) -> str:
+    """What a setting is called in a sentence."""
+    return str(_types(kind)[name].__metadata__[0].title)
+
+
+def limits(kind: type[msgspec.Struct], name: str) -> dict[str, Any]:
+    """From and to, as a control's `min` and `max`."""
+    about: msgspec.Meta = _types(kind)[name].__metadata__[0]
+    return {key: edge for key, edge in (("min", about.ge), ("max", about.le)) if edge is not None}
+
+
+def taken(kind: type[Kind] | Any, saved: Any, part: str) -> Any:
+    """What a session's file holds as its description has it; InputError names the part that makes no sense."""
+    try:
+        return msgspec.convert(saved, kind)
+    except msgspec.ValidationError as error:
+        raise InputError(f"the session's {part} is damaged ({quoted(error, 120)}); save it anew") from None
+
+
+def number(value: Any, what: str) -> float:
+    """A finite number, or InputError."""
+    try:
+        read = float(value)
+    except (TypeError, ValueError, OverflowError):
+        read = math.nan
+    if not math.isfinite(read):
+        raise InputError(f"{what} must be a number, not {quoted(value, 40)!r}")
+    return read
+
+
+def _may(of: Any, axes: Axes) -> str:
+    about, base = of.__metadata__[0], of.__origin__
+    if base is str:
+        return "be a text"
+    if base is int:
+        return f"be a whole number from {about.ge} to {about.le}"
+    low, high = (f"{edge:g}".replace("-", "−") for edge in (about.ge, about.le))
+    unit = axes.unit(about.extra["unit"], about.extra["side"])
+    return f"lie between {low} and {high} {unit}".rstrip()
+
+
+def _as_given(value: Any) -> str:
+    return f"{value:g}" if isinstance(value, float | int) and not isinstance(value, bool) else repr(quoted(value, 40))
+
+
+@cache
+def _types(kind: type[msgspec.Struct]) -> dict[str, Any]:
+    return get_type_hints(kind, include_extras=True)
+
+
+# --- what the page is set to.  Each setting is described once; a browser or a session's file may send anything --------
 
 SLIDERS = ""
 MONITORS = ("healthy", "same faults", "identified")
@@ -167,3 +264,57 @@ class Settings(msgspec.Struct, eq=False):
 
 
 _NAMES = tuple(name for name in Settings.__struct_fields__ if name != "axes")
+
+
+# --- what Explore's controls were set to before -----------------------------------------------------------------------
+# A step back for each movement of a slider, not each of its values.
+# The model that plays the plant is one of them: another one sets the sliders to its own faults.
+
+_KEPT = (
+    "k", "command", "command_settings", "duration_s", "load_torque_Nm", "load_shape", "load_time_s",
+    "load_frequency_Hz", "current_noise_A", "encoder_bits", "start_offset_rad", "start_speed_rad_s", "start_side",
+)  # fmt: skip
+_PLANT = "plant"  # of a step
+_ONE_MOVEMENT_S = 0.8  # changes of one control that follow each other so soon
+_MOST = 100
+
+
+class Undo:
+    """Steps back of some settings, and of the plant's model: plant() is its name, choose(name) goes back to it."""
+
+    def __init__(
+        self,
+        settings: Settings,
+        plant: Callable[[], str] = lambda: "",
+        choose: Callable[[str], object] = lambda name: None,
+    ) -> None:
+        self._settings, self._plant, self._choose = settings, plant, choose
+        self._steps: list[dict[str, Any]] = []
+        self._last: tuple[Any, float] = (None, 0.0)
+
+    def __bool__(self) -> bool:
+        return bool(self._steps)
+
+    def keep(self, control: Any) -> None:
+        """To be called before a change by this control."""
+        now, (before, at) = time.monotonic(), self._last
+        self._last = control, now
+        if control is before and now - at < _ONE_MOVEMENT_S:
+            return
+        self._steps = [*self._steps[1 - _MOST :], self._now()]
+
+    def back(self) -> bool:
+        """Takes the settings back to where they differed last; False where nothing is left."""
+        self._last = None, 0.0
+        while self._steps:
+            step = self._steps.pop()
+            if step != self._now():
+                if (plant := step.pop(_PLANT)) != self._plant():
+                    self._choose(plant)  # before the sliders, which it moves
+                self._settings.restore({**self._settings.saved(), **step})
+                return True
+        return False
+
+    def _now(self) -> dict[str, Any]:
+        saved = self._settings.saved()
+        return {name: saved[name] for name in _KEPT} | {_PLANT: self._plant()}

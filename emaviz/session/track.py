@@ -23,20 +23,16 @@ from ema_model.recordings import read
 from ema_model.recordings.recording_set import recordings_in
 from ema_model.recordings.side_file import SideFile
 from ema_model.tracking.evidence import LEAST_FLIGHTS
-from ema_model.tracking.flight import Flight
+from ema_model.tracking.flights import Flight, check_enough, check_order, flights_in, identified, in_order
 from ema_model.tracking.history import History
-from ema_model.tracking.identify import identified
-from ema_model.tracking.order import check_enough, check_order, flights_in, in_order
 from ema_model.tracking.result import Tracked
 from ema_model.tracking.track import check_thresholds
 from emaviz.session.data_folder import DataFolder
-from emaviz.session.described import number, taken
 from emaviz.session.files import Practice, side_file_of
 from emaviz.session.inputs import Inputs, Provenance, version_with_side
-from emaviz.session.job import RESTED, Job, Run, Stopped
 from emaviz.session.session import Session
-from emaviz.session.signal import Signal
-from emaviz.session.worker import Worker
+from emaviz.session.settings import number, taken
+from emaviz.session.worker import RESTED, Job, Run, Signal, Stopped, Worker
 
 # --- what a session's file holds of Track -----------------------------------------------------------------------------
 # What a session's file holds of Track: thresholds and identified flights, so that none is identified again.

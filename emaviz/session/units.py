@@ -22,13 +22,11 @@ from ema_model.units.folders import check_same_type, units_in
 from ema_model.units.result import Alone, Difference, Need, OfRecording, OfType, Transfer, UnitsCompared
 from emaviz.session import files as session_files
 from emaviz.session.data_folder import DataFolder
-from emaviz.session.described import taken
 from emaviz.session.files import Practice, side_file_of
 from emaviz.session.inputs import Inputs, Provenance, digest, version_with_side
-from emaviz.session.job import Job, Run
 from emaviz.session.session import Session
-from emaviz.session.signal import Signal
-from emaviz.session.worker import Worker
+from emaviz.session.settings import taken
+from emaviz.session.worker import Job, Run, Signal, Worker
 
 # --- what a session's file holds of Units -----------------------------------------------------------------------------
 # What a session's file holds of Units: what is chosen, and the answer as it was found: nothing is run again.

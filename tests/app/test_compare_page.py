@@ -17,8 +17,8 @@ from support.two_clocks import write_two_clocks
 from ema_model.actuator import load_actuator
 from ema_model.commands import command
 from ema_model.recordings import write_measurement
+from ema_model.recordings.measurement import Sensors
 from ema_model.simulation.run import Run, simulate_reference
-from ema_model.simulation.sensors import Sensors
 from emaviz.page.app import App
 from emaviz.page.compare.result import View
 from emaviz.page.compare.tab import CompareTab

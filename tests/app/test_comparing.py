@@ -13,11 +13,11 @@ import pytest
 from ema_model.actuator import load_actuator, shipped
 from ema_model.commands import command
 from ema_model.errors import InputError
-from ema_model.files.limits import FILE_BYTES, PAGE_BYTES
+from ema_model.files.opened import FILE_BYTES, PAGE_BYTES
 from ema_model.recordings import ColumnMapping, MappedColumn, Measurement, read_side_file, side_path, write_measurement
 from ema_model.recordings.formats.text_layout import Hints
+from ema_model.recordings.measurement import Sensors
 from ema_model.simulation.run import Run, simulate_reference
-from ema_model.simulation.sensors import Sensors
 from emaviz.recording import read
 from emaviz.session.compare import Comparing
 from emaviz.session.data_folder import DataFolder

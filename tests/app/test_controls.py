@@ -12,7 +12,7 @@ import pytest
 from support.on_page import choose, field, fill, wait_until
 
 from ema_model.faults import HEALTHY
-from ema_model.identification.next_experiment import Suggestion
+from ema_model.identification.uncertainty import Suggestion
 from emaviz.page.explore.tab import ExploreTab
 from emaviz.page.identify.tab import IdentifyTab
 from emaviz.recording import read

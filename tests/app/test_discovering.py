@@ -19,7 +19,7 @@ from emaviz.page.discover import candidate
 from emaviz.page.discover.result import _SHOWN, as_csv, run_of
 from emaviz.page.discover.tab import STEPS, step
 from emaviz.recording.read import read
-from emaviz.scene.motion import motion
+from emaviz.scene.playback import motion
 from emaviz.session.discover.source import agrees, document_of
 
 EASY = "first_bench_run"

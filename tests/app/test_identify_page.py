@@ -19,9 +19,9 @@ from ema_model.identification.search import slices, ways
 from ema_model.identification.words import facts, way_sentences, why_best
 from ema_model.quantities.numbers import amount
 from ema_model.recordings import write_measurement
+from ema_model.recordings.measurement import Sensors
 from ema_model.recordings.read import read_measurement
 from ema_model.simulation.run import Run, simulate_reference
-from ema_model.simulation.sensors import Sensors
 from emaviz.figures import identification
 from emaviz.figures.identification import Row, table
 from emaviz.page.identify.result import at_iteration, telling

@@ -7,9 +7,7 @@ import threading
 from support.on_page import wait_until
 
 from ema_model.errors import InputError
-from emaviz.session.job import Job
-from emaviz.session.pace import Pace
-from emaviz.session.worker import Worker
+from emaviz.session.worker import Job, Pace, Worker
 
 
 class Heard:

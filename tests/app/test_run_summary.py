@@ -11,8 +11,7 @@ from support.on_page import wait_until
 
 from ema_model.quantities.numbers import with_uncertainty
 from emaviz.page.discover.tab import step
-from emaviz.session.run_summary import summary
-from emaviz.session.saved import Recorded
+from emaviz.session.saved import Recorded, summary
 
 
 @pytest.mark.parametrize(

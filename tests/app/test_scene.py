@@ -18,16 +18,15 @@ from ema_model.actuator import load_actuator
 from ema_model.commands import command
 from ema_model.faults import vector
 from ema_model.simulation.run import Run, simulate_reference
+from emaviz.page.app import tabs
 from emaviz.page.docked import LEFT_PX, _width_px
-from emaviz.page.members import tabs
 from emaviz.page.style import STRIP_HEIGHT_PX
 from emaviz.scene import actuator as actuator_scene
 from emaviz.scene import solids
 from emaviz.scene.actuator import _NAMES, NAMED_AT, ActuatorScene
 from emaviz.scene.framing import BOXES, frame
 from emaviz.scene.labels import Label, lay_out
-from emaviz.scene.motion import enlargement, motion
-from emaviz.scene.playback import Playback
+from emaviz.scene.playback import Playback, enlargement, motion
 from emaviz.scene.solids import FAULT, RESIDUAL
 from emaviz.server.safe_server import open_server
 from emaviz.session.session import Simulation

@@ -22,10 +22,9 @@ from emaviz.page.playback import Looks
 from emaviz.page.runs import RunsTab
 from emaviz.session import saved as session_file
 from emaviz.session.data_folder import DataFolder
-from emaviz.session.described import taken
 from emaviz.session.discover.source import SavedStory
 from emaviz.session.saved import Part
-from emaviz.session.settings import Settings
+from emaviz.session.settings import Settings, taken
 
 
 def changed_settings():

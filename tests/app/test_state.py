@@ -9,8 +9,7 @@ import pytest
 
 from ema_model.errors import InputError
 from ema_model.quantities.axes import Axes
-from emaviz.session.described import limits
-from emaviz.session.settings import Settings
+from emaviz.session.settings import Settings, limits
 
 NONSENSE = [math.nan, math.inf, "abc", None, "", [], {}, "<script>"]
 

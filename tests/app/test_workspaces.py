@@ -11,8 +11,8 @@ from support.on_page import press, wait_until
 from ema_model.actuator import load_actuator
 from ema_model.commands import command
 from ema_model.recordings import write_measurement
+from ema_model.recordings.measurement import Sensors
 from ema_model.simulation.run import Run, simulate_reference
-from ema_model.simulation.sensors import Sensors
 from emaviz.page.explore.tab import ExploreTab
 
 pytestmark = pytest.mark.browser

@@ -14,12 +14,12 @@ import numpy as np
 from ema_model import faults
 from ema_model.actuator import load_actuator
 from ema_model.campaign.thesis import CASES
-from ema_model.identification.objective import Objective
 from ema_model.identification.optimisers import create
 from ema_model.identification.run import identify
+from ema_model.identification.search import Objective
+from ema_model.recordings.measurement import Sensors
 from ema_model.simulation.plant import simulated
 from ema_model.simulation.run import Run
-from ema_model.simulation.sensors import Sensors
 
 ALGORITHMS = ("ssa", "hba", "do")
 

@@ -93,7 +93,7 @@ def peak() -> float:
 
 def watched(lane_steps: Counter[Key]) -> None:
     """Has every simulation of the monitor model add its lanes × steps, by stack."""
-    from ema_model.identification.objective import Objective
+    from ema_model.identification.search import Objective
     from ema_model.models.closed_loop import ClosedLoop
 
     simulated, fitness = ClosedLoop._simulated, Objective.__call__
@@ -118,11 +118,11 @@ def main() -> None:
     import ema_model as em
     from ema_model.actuator import load_actuator
     from ema_model.faults import vector
-    from ema_model.identification.objective import Objective
     from ema_model.identification.run import identify
+    from ema_model.identification.search import Objective
+    from ema_model.recordings.measurement import Sensors
     from ema_model.simulation.plant import simulated
     from ema_model.simulation.run import Run
-    from ema_model.simulation.sensors import Sensors
 
     with tempfile.TemporaryDirectory() as folder:
         discovery.record(Path(folder))

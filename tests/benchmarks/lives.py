@@ -25,9 +25,9 @@ from ema_model.campaign.kinds.track import ALPHA, LAMBDA, LAMBDAS, Told, places
 from ema_model.estimation.unknowns import ECCENTRICITY, to_vector
 from ema_model.lives import LAWS, Life, drawn, worn_life
 from ema_model.lives.life import ONSET, POWER, base_of
-from ema_model.tracking.flight import Flight
+from ema_model.tracking.flights import Flight
+from ema_model.tracking.series import Unit
 from ema_model.tracking.track import Tracker
-from ema_model.tracking.unit import Unit
 
 WAYS = ("emaviz", "exponential fit", "particle filter", "law alone", "oracle", "bound")
 VARIATIONS = (0.5, 1.0)

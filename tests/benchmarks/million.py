@@ -17,8 +17,8 @@ from ema_model.commands import command
 from ema_model.comparison import compare
 from ema_model.recordings import Measurement, write_measurement
 from ema_model.recordings import read as read_recording
+from ema_model.recordings.measurement import Sensors
 from ema_model.simulation.run import Run, simulate_reference
-from ema_model.simulation.sensors import Sensors
 from emaviz.report import write_report
 
 KEPT = ("time_s", "command_rad", "user_position_rad", "motor_position_rad", "motor_speed_rad_s", "current_A")

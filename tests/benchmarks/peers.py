@@ -29,11 +29,11 @@ from numpy.typing import NDArray
 from ema_model import faults
 from ema_model.actuator import load_actuator
 from ema_model.campaign.thesis import CASES
-from ema_model.identification.objective import Objective
 from ema_model.identification.run import ROBUST, steps, warm_up
+from ema_model.identification.search import Objective
+from ema_model.recordings.measurement import Sensors
 from ema_model.simulation.plant import simulated
 from ema_model.simulation.run import Run
-from ema_model.simulation.sensors import Sensors
 
 Array = NDArray[np.float64]
 

@@ -17,9 +17,9 @@ import numpy as np
 
 from ema_model import faults
 from ema_model.actuator import load_actuator
-from ema_model.identification.objective import Objective
 from ema_model.identification.optimisers import OPTIMISERS
 from ema_model.identification.run import identify
+from ema_model.identification.search import Objective
 from ema_model.physics.rows import CURRENT, LANES
 from ema_model.simulation.pack import initial_state, monitor_rows
 from ema_model.simulation.plant import simulated

@@ -14,7 +14,7 @@ from ema_model.campaign.execute import OtherVersion, execute
 from ema_model.campaign.one_compiler import Turns
 from ema_model.campaign.schedulers import Processes
 from ema_model.campaign.store import version
-from ema_model.simulation import one_stack
+from ema_model.simulation import compiled
 
 COMPILES = """
 import sys
@@ -87,16 +87,16 @@ def test_a_lock_that_stays_is_waited_for_and_then_passed(tmp_path, monkeypatch):
 
 
 def test_what_is_compiled_does_not_choose_the_kernels(monkeypatch):
-    monkeypatch.setattr(one_stack, "_only_library", False)  # whatever another test made of this process
-    monkeypatch.setattr(one_stack, "is_known", lambda *_: True)
-    monkeypatch.setattr(one_stack, "is_compiled", lambda *_: True)
+    monkeypatch.setattr(compiled, "_only_library", False)  # whatever another test made of this process
+    monkeypatch.setattr(compiled, "is_known", lambda *_: True)
+    monkeypatch.setattr(compiled, "is_compiled", lambda *_: True)
     from ema_model.actuator import load_actuator
 
     actuator = load_actuator()
-    assert one_stack.stack_at_hand(actuator, ["hinge_moment"], "reduced", "run").effects == ("hinge_moment",)
-    one_stack.always_library()
-    assert set(one_stack.stack_at_hand(actuator, ["hinge_moment"], "reduced", "run").effects) == set(one_stack.LIBRARY)
-    assert one_stack.stack_at_hand(actuator, [], "reduced", "run").effects == ()
+    assert compiled.stack_at_hand(actuator, ["hinge_moment"], "reduced", "run").effects == ("hinge_moment",)
+    compiled.always_library()
+    assert set(compiled.stack_at_hand(actuator, ["hinge_moment"], "reduced", "run").effects) == set(compiled.LIBRARY)
+    assert compiled.stack_at_hand(actuator, [], "reduced", "run").effects == ()
 
 
 def test_a_worker_of_another_version_computes_nothing(tmp_path):

@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 
 from emaviz.cli import COMMANDS
-from emaviz.cli.files import Input, Output
+from emaviz.cli.options import Input, Output
 from emaviz.cli.parser import parser_of
 
 TEXT = {  # options that name no file and take no single number; each is refused or taken by what it is for

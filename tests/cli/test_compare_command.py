@@ -8,7 +8,7 @@ from support.documents import result_of
 from support.two_clocks import write_two_clocks
 
 from ema_model.actuator import load_actuator
-from ema_model.files.shipped import shipped_folder
+from ema_model.files.opened import shipped_folder
 from ema_model.recordings.read import read_measurement
 from emaviz.cli import main
 from emaviz.recording import read

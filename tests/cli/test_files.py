@@ -9,8 +9,7 @@ from options_of import TEXT, command_parser, needed, options_with_values
 
 from ema_model.errors import InputError
 from emaviz.cli import main
-from emaviz.cli.files import Folder, Input, Output, check_files
-from emaviz.cli.options import Number
+from emaviz.cli.options import Folder, Input, Number, Output, check_files
 
 OPTIONS = options_with_values()
 OUTPUTS = [one for one in OPTIONS if isinstance(one[2].type, Output)]

@@ -27,11 +27,11 @@ COMMANDS = {
 }
 # What was just imported when the interrupt comes.
 MOMENTS = {
-    "gui": ("emaviz.cli.interrupt", "argparse", "numpy", "numba", "scipy", "pyarrow", "viser", "emaviz.page.app"),
-    "compare": ("emaviz.cli.interrupt", "argparse", "numpy", "numba", "ema_model.comparison", "pyarrow"),
+    "gui": ("emaviz.cli.ending", "argparse", "numpy", "numba", "scipy", "pyarrow", "viser", "emaviz.page.app"),
+    "compare": ("emaviz.cli.ending", "argparse", "numpy", "numba", "ema_model.comparison", "pyarrow"),
 }
 QUICK = (
-    ("gui", "emaviz.cli.interrupt"),
+    ("gui", "emaviz.cli.ending"),
     ("gui", "numba"),
     ("gui", "emaviz.page.app"),
     ("compare", "ema_model.comparison"),
@@ -142,7 +142,7 @@ def test_a_second_interrupt_ends_it_at_once(start, command, tmp_path):
 
 STUCK = """
 import sys, threading, time
-from emaviz.cli.interrupt import until_interrupted
+from emaviz.cli.ending import until_interrupted
 
 def run():
     print("ready", flush=True)
@@ -165,7 +165,7 @@ def test_what_swallows_the_interrupt_ends_as_well(running, stuck):
 
 CLOSING = """
 import atexit, sys, threading, time
-from emaviz.cli.interrupt import until_interrupted
+from emaviz.cli.ending import until_interrupted
 
 def run():
     threading.Thread(target=time.sleep, args=(60,)).start()  # that Python would wait for
@@ -282,7 +282,7 @@ def test_a_tracking_that_is_interrupted_says_what_the_flights_so_far_say(cut_off
 
 WRITING = """
 import sys, time
-from emaviz.cli.interrupt import PartialAnswer, until_interrupted
+from emaviz.cli.ending import PartialAnswer, until_interrupted
 
 def run():
     try:

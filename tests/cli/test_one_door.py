@@ -14,7 +14,7 @@ from support.on_page import wait_until
 from ema_model import comparison, discovery
 from ema_model.actuator import load_actuator, shipped
 from ema_model.commands import command
-from ema_model.identification import objective
+from ema_model.identification import search
 from ema_model.quantities.numbers import amount
 from ema_model.recordings import Measurement, read, write_measurement
 from ema_model.simulation import run as simulating
@@ -153,7 +153,7 @@ def test_the_same_comes_in_by_every_way(kind, way, rig, tmp_path, monkeypatch):
         assert np.array_equal(run.command.time_s, expected.time_s)
         return
     else:
-        module = {"compare": comparison, "discover": discovery, "identify": objective}[way]
+        module = {"compare": comparison, "discover": discovery, "identify": search}[way]
         function = "Objective" if way == "identify" else way
         (found,) = on_command_line(way, module, function, monkeypatch, path, *asked)
     assert set(found.signals) == set(expected.signals)
@@ -173,11 +173,11 @@ def test_the_arrays_are_what_the_model_needs(rig, run):
 
 
 def test_a_line_says_what_was_assumed_and_canonical_names_are_silent(rig, tmp_path, monkeypatch, capsys):
-    on_command_line("identify", objective, "Objective", monkeypatch, rig / "german.csv")
+    on_command_line("identify", search, "Objective", monkeypatch, rig / "german.csv")
     told = capsys.readouterr().err
     assert told.startswith("german.csv: time_s from Zeit [ms], command_rad from Sollwinkel [°], ")
     assert "motor_speed_rad_s from Motordrehzahl [1/min], current_A from iq [mA]\n" in told and told.count("\n") == 1
-    on_command_line("identify", objective, "Objective", monkeypatch, rig / "phases.csv")
+    on_command_line("identify", search, "Objective", monkeypatch, rig / "phases.csv")
     assert capsys.readouterr().err == ""
 
 
@@ -208,7 +208,7 @@ def test_what_is_unsure_is_asked_for_with_an_option_to_copy(header, tmp_path, ca
     if "COLUMN" in options[0]:
         options = ["command_rad=flow[rad]"]
     given = [part for option in options for part in ("--map", option)]
-    (found,) = on_command_line("identify", objective, "Objective", monkeypatch, path, *given)
+    (found,) = on_command_line("identify", search, "Objective", monkeypatch, path, *given)
     assert np.array_equal(found["time_s"], read(path, load_actuator(), options).time_s)
 
 

@@ -9,7 +9,7 @@ import pytest
 from support.documents import check_document, misfit, result_of
 
 from emaviz.cli import COMMANDS, main
-from emaviz.cli.exit_code import ExitCode
+from emaviz.cli.ending import ExitCode
 from emaviz.cli.parser import parser_of, whole_parser
 from emaviz.cli.verbs.schema import schema_of, verbs_with_documents
 

@@ -15,8 +15,8 @@ from ema_model.comparison import as_dict, compare
 from ema_model.comparison.words import errors, held_out, verdict
 from ema_model.discovery import discover
 from ema_model.estimation.floor import floor
-from ema_model.identification.objective import Objective
 from ema_model.identification.run import identify
+from ema_model.identification.search import Objective
 from ema_model.models import ClosedLoop, InverseDynamics
 from ema_model.recordings import Measurement, SideFile
 from ema_model.simulation.run import Run, Sensors, simulate_monitor, simulate_reference

@@ -15,9 +15,8 @@ from ema_model.comparison.events import _at_once
 from ema_model.comparison.summary import as_dict
 from ema_model.discovery import discover
 from ema_model.recordings import Measurement
-from ema_model.simulation.load_profile import LoadProfile
-from ema_model.simulation.run import Run, simulate_reference
-from ema_model.simulation.sensors import Sensors
+from ema_model.recordings.measurement import Sensors
+from ema_model.simulation.run import LoadProfile, Run, simulate_reference
 
 WHEN_S = 0.23
 CHIRP = ("chirp", {}, 0.5)

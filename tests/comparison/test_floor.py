@@ -19,9 +19,9 @@ from ema_model.comparison.verdict import slow_ratio
 from ema_model.estimation import Floor, after_fit, calibrate, floor
 from ema_model.estimation.floor import spread, twin_error
 from ema_model.models import ClosedLoop
+from ema_model.recordings.measurement import Sensors
 from ema_model.recordings.noise import held
 from ema_model.simulation.run import Run, simulate_reference
-from ema_model.simulation.sensors import Sensors
 
 ACTUATOR = load_actuator()
 

@@ -12,7 +12,7 @@ from ema_model.actuator import load_actuator
 from ema_model.comparison import compare
 from ema_model.discovery import discover
 from ema_model.errors import InputError
-from ema_model.identification.objective import Objective
+from ema_model.identification.search import Objective
 from ema_model.models.measured_motion import fit_stretches, on_even_grid
 from ema_model.recordings import Measurement
 from ema_model.simulation.run import Run, simulate_monitor, simulate_reference

@@ -15,8 +15,8 @@ from ema_model.discovery.steps.snapshot import assessed
 from ema_model.discovery.words import PAGES, candidates, effect_title, rung_label, rung_title, size, typical
 from ema_model.faults import BY_NAME, CAUSES, vector
 from ema_model.quantities.axes import ROTARY
+from ema_model.recordings.measurement import Sensors
 from ema_model.simulation.run import Run, simulate_reference
-from ema_model.simulation.sensors import Sensors
 
 ACTUATOR = load_actuator()
 RIG = Sensors(current_noise_A=0.45, encoder_bits=12)

@@ -16,8 +16,8 @@ from ema_model.discovery.steps.begin import begun
 from ema_model.discovery.words import as_dict
 from ema_model.estimation.model_fit import holdout_error
 from ema_model.faults import vector
+from ema_model.recordings.measurement import Sensors
 from ema_model.simulation.run import Run, simulate_reference
-from ema_model.simulation.sensors import Sensors
 
 ACTUATOR = load_actuator()
 RIG = Sensors(current_noise_A=0.45, encoder_bits=12)

@@ -9,8 +9,8 @@ from ema_model.commands import command
 from ema_model.discovery.candidates import fingerprints
 from ema_model.discovery.candidates.score import scored
 from ema_model.discovery.steps.begin import begun
+from ema_model.recordings.measurement import Sensors
 from ema_model.simulation.run import Run, simulate_reference
-from ema_model.simulation.sensors import Sensors
 
 
 def test_what_diverges_at_every_strength_cannot_be_shown(monkeypatch):

@@ -10,8 +10,8 @@ from ema_model.discovery import discover
 from ema_model.discovery.candidates.fingerprints import variants
 from ema_model.discovery.words import sentences
 from ema_model.effects import CATALOGUE, find
+from ema_model.recordings.measurement import Sensors
 from ema_model.simulation.run import Run, simulate_reference
-from ema_model.simulation.sensors import Sensors
 
 CHIRP = ("chirp", {}, 0.5)
 SINE = ("sine", {"amplitude_rad": 0.03, "frequency_Hz": 3.0}, 1.0)

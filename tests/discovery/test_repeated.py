@@ -12,8 +12,8 @@ from ema_model.discovery.discover import result_of
 from ema_model.discovery.steps.begin import begun
 from ema_model.discovery.words import as_dict, document_of
 from ema_model.faults import vector
+from ema_model.recordings.measurement import Sensors
 from ema_model.simulation.run import Run, simulate_reference
-from ema_model.simulation.sensors import Sensors
 
 ACTUATOR = load_actuator()
 

@@ -16,8 +16,8 @@ from ema_model.discovery import as_dict, discover, verified
 from ema_model.discovery.words import verification
 from ema_model.estimation.model_fit import with_effect
 from ema_model.faults import vector
+from ema_model.recordings.measurement import Sensors
 from ema_model.simulation.run import Run, simulate_reference
-from ema_model.simulation.sensors import Sensors
 
 ACTUATOR = load_actuator()
 RIG = Sensors(current_noise_A=0.3, encoder_bits=12)

@@ -17,8 +17,8 @@ from ema_model.challenges.truth import RUNS, Truth, seal, unseal
 from ema_model.effects import CATALOGUE
 from ema_model.errors import InputError
 from ema_model.recordings import read
+from ema_model.recordings.measurement import Sensors
 from ema_model.simulation.run import simulate_reference
-from ema_model.simulation.sensors import Sensors
 
 HIDDEN = {"cogging_torque": {"amplitude_Nm": 0.02, "order": 12.0, "phase_rad": 0.5}}
 TRUTH = Truth("", 7, "Hidden: cogging torque.", HIDDEN, faults={"k1": 0.4})

@@ -21,8 +21,8 @@ from ema_model.estimation.floor import floor
 from ema_model.estimation.model_fit import Fit, fit, gather, with_effect
 from ema_model.models import model_for
 from ema_model.recordings import prepared
+from ema_model.recordings.measurement import Sensors
 from ema_model.simulation.run import Run, simulate_reference
-from ema_model.simulation.sensors import Sensors
 
 COMMANDS = [("chirp", {}, 0.5), ("step", {"final_rad": 0.005}, 0.5)]
 ORDERS = {

@@ -17,11 +17,11 @@ from ema_model.estimation.problem import TOGETHER
 from ema_model.estimation.unknowns import K_SIGMA, to_vector, unknowns_of
 from ema_model.faults import HEALTHY, NAMES, vector
 from ema_model.identification.fit import setting
-from ema_model.identification.objective import Objective
+from ema_model.identification.search import Objective
 from ema_model.models import model_for
+from ema_model.recordings.measurement import Sensors
 from ema_model.simulation.plant import simulated
 from ema_model.simulation.run import Run, simulate_reference
-from ema_model.simulation.sensors import Sensors
 
 ACTUATOR = load_actuator()
 BLIND = replace(ACTUATOR, controller=replace(ACTUATOR.controller, kind="unknown"))

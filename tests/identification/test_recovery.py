@@ -13,12 +13,12 @@ from ema_model.commands import command
 from ema_model.errors import InputError
 from ema_model.faults import HEALTHY, NAMES, error_percent, vector
 from ema_model.identification.fit import refine, setting
-from ema_model.identification.objective import Objective
 from ema_model.identification.run import Identification, Progress, identify, steps
+from ema_model.identification.search import Objective
 from ema_model.identification.uncertainty import uncertainty
+from ema_model.recordings.measurement import Sensors
 from ema_model.simulation.plant import simulated
 from ema_model.simulation.run import Run
-from ema_model.simulation.sensors import Sensors
 
 ACTUATOR = load_actuator()
 CASES = ({"k2": 0.75}, {"k1": 0.25}, {"k3": 0.25}, {"k8": 0.75})

@@ -13,18 +13,16 @@ from ema_model import faults
 from ema_model.actuator import load_actuator
 from ema_model.commands import command
 from ema_model.errors import InputError
-from ema_model.estimation.feldman_cousins import above_zero, length_of_vector
 from ema_model.estimation.least_squares import Descent
 from ema_model.estimation.model_fit import with_effect
 from ema_model.estimation.unknowns import to_k, to_vector
-from ema_model.identification.base_spreads import most_likely_spreads
-from ema_model.identification.fit import refine, setting
-from ema_model.identification.model_bias import TWINS, _spread, twins
-from ema_model.identification.objective import Objective
+from ema_model.identification.fit import TWINS, _spread, most_likely_spreads, refine, setting, twins
 from ema_model.identification.run import identify
+from ema_model.identification.search import Objective
+from ema_model.identification.uncertainty import above_zero, length_of_vector
+from ema_model.recordings.measurement import Sensors
 from ema_model.simulation.plant import simulated
 from ema_model.simulation.run import Run, simulate_reference
-from ema_model.simulation.sensors import Sensors
 
 ACTUATOR = load_actuator()
 MULTI = {"k1": 0.0133, "k2": 0.05, "k3": 0.003, "k6": 0.012, "k8": 0.35}

@@ -9,8 +9,8 @@ from support.second_plant import SecondPlant
 from ema_model import faults
 from ema_model.actuator import load_actuator
 from ema_model.identification.fit import refine, setting
-from ema_model.identification.objective import Objective
 from ema_model.identification.run import ROBUST, identify
+from ema_model.identification.search import Objective
 from ema_model.identification.uncertainty import uncertainty
 from ema_model.recordings import Measurement
 from ema_model.simulation.run import Run, simulate_reference

@@ -21,7 +21,7 @@ from ema_model.models.inverse_dynamics import InverseDynamics
 from ema_model.models.loop_window import cut
 from ema_model.quantities.axes import Axes
 from ema_model.recordings import Measurement
-from ema_model.recordings.health.card import health
+from ema_model.recordings.health import health
 from ema_model.recordings.read import check_needed, prepared
 from ema_model.simulation.run import Run, finite, run_in_words
 from emaviz.cli.given import effects_of

@@ -12,8 +12,8 @@ from ema_model.commands import command
 from ema_model.estimation.floor import floor, twin_error
 from ema_model.faults import HEALTHY, vector
 from ema_model.models import Model, model_for
+from ema_model.recordings.measurement import Sensors
 from ema_model.simulation.run import Run, simulate_reference
-from ema_model.simulation.sensors import Sensors
 
 THESIS = load_actuator()
 BLIND = replace(THESIS, controller=replace(THESIS.controller, kind="unknown"))

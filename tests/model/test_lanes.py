@@ -13,11 +13,11 @@ from ema_model.actuator import load_actuator
 from ema_model.commands import command
 from ema_model.effects import find
 from ema_model.faults import HEALTHY, vector
-from ema_model.identification.objective import Objective
+from ema_model.identification.search import Objective
 from ema_model.physics.rows import LANES
 from ema_model.recordings import Measurement
 from ema_model.simulation import run as simulation
-from ema_model.simulation.one_stack import stack_at_hand
+from ema_model.simulation.compiled import stack_at_hand
 from ema_model.simulation.pack import initial_state, monitor_rows
 from ema_model.simulation.plant import simulated
 from ema_model.simulation.run import Run, simulate_monitor, traced

@@ -11,8 +11,7 @@ from ema_model.actuator import load_actuator
 from ema_model.commands import command
 from ema_model.errors import InputError
 from ema_model.faults import vector
-from ema_model.simulation.load_profile import SHAPES, LoadProfile
-from ema_model.simulation.run import Run, simulate_monitor, simulate_monitors, simulate_reference
+from ema_model.simulation.run import SHAPES, LoadProfile, Run, simulate_monitor, simulate_monitors, simulate_reference
 
 TIME = np.linspace(0.0, 0.4, 4001)
 

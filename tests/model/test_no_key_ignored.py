@@ -21,7 +21,7 @@ from ema_model.actuator.unread import INVERSE_PLACES, WINDING_PLACES, check_valu
 from ema_model.effects import CATALOGUE
 from ema_model.errors import InputError
 from ema_model.faults import HEALTHY, vector
-from ema_model.identification.objective import Objective
+from ema_model.identification.search import Objective
 from ema_model.kernels import inverse
 from ema_model.models import ClosedLoop, InverseDynamics
 from ema_model.recordings import Measurement

@@ -17,14 +17,13 @@ from ema_model.effects import CATALOGUE, find
 from ema_model.effects.effect import ADVANCE, PLACES, STAGES
 from ema_model.effects.user import user_torque
 from ema_model.faults import HEALTHY
-from ema_model.identification.objective import Objective
+from ema_model.identification.search import Objective
 from ema_model.models import ClosedLoop, InverseDynamics
 from ema_model.physics.rows import LANES
-from ema_model.simulation import one_stack
-from ema_model.simulation.one_stack import LIBRARY, library_stack, own_stack, stack_at_hand
+from ema_model.simulation import compiled as compiled_simulation
+from ema_model.simulation.compiled import LIBRARY, is_compiled, library_stack, own_stack, stack_at_hand
 from ema_model.simulation.pack import initial_reference_state, initial_state, monitor_rows, reference_rows
 from ema_model.simulation.plant import simulated
-from ema_model.simulation.precompile import is_compiled
 from ema_model.simulation.run import Run
 from ema_model.stacks import Stack
 
@@ -187,7 +186,9 @@ def test_what_the_library_has_is_run_in_it():
 
 
 def test_what_is_compared_goes_in_the_library_and_what_is_searched_has_its_own(monkeypatch):
-    monkeypatch.setattr(one_stack, "is_known", lambda *parts: False)  # whatever an earlier run has left in the cache
+    monkeypatch.setattr(
+        compiled_simulation, "is_known", lambda *parts: False
+    )  # whatever an earlier run has left in the cache
     recording, effects = simulated(Run(duration_s=0.02), ACTUATOR, HEALTHY), {"dead_time": {}}
     assert ClosedLoop([recording], ACTUATOR, effects=effects).stack is library_stack(ACTUATOR)
     assert InverseDynamics([recording], ACTUATOR, effects=effects).stack is library_stack(ACTUATOR)
@@ -197,8 +198,8 @@ def test_what_is_compared_goes_in_the_library_and_what_is_searched_has_its_own(m
 TAKEN = """
 import sys
 from ema_model.actuator import load_actuator
-from ema_model.simulation.one_stack import library_stack, own_stack, stack_at_hand
-from ema_model.simulation.precompile import compile_ahead, compile_here, is_compiled, wait_for
+from ema_model.simulation.compiled import library_stack, own_stack, stack_at_hand
+from ema_model.simulation.compiled import compile_ahead, compile_here, is_compiled, wait_for
 actuator, names = load_actuator(), ["winding_resistance"]
 assert stack_at_hand(actuator, names, "reduced", "currents") is library_stack(actuator)
 own = own_stack(actuator, names)

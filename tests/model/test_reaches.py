@@ -11,7 +11,7 @@ from ema_model.actuator import load_actuator, paths
 from ema_model.commands import command
 from ema_model.effects import CATALOGUE
 from ema_model.faults import NAMES, vector
-from ema_model.identification.objective import Objective
+from ema_model.identification.search import Objective
 from ema_model.simulation.plant import simulated
 from ema_model.simulation.run import Run, simulate_monitor, simulate_reference
 

@@ -9,8 +9,8 @@ from ema_model.actuator import load_actuator
 from ema_model.commands import command
 from ema_model.errors import InputError
 from ema_model.recordings import Measurement
+from ema_model.recordings.measurement import Sensors
 from ema_model.simulation.run import Run, simulate_reference
-from ema_model.simulation.sensors import Sensors
 
 ACTUATOR = load_actuator()
 

@@ -296,7 +296,7 @@ import threading
 import numpy as np
 from ema_model.actuator import load_actuator
 from ema_model.faults import HEALTHY
-from ema_model.identification.objective import Objective
+from ema_model.identification.search import Objective
 from ema_model.simulation.plant import simulated
 from ema_model.simulation.run import Run, simulate_monitor
 import numba

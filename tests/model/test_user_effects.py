@@ -20,7 +20,7 @@ from ema_model.effects import CATALOGUE, Effect, find
 from ema_model.effects.user import torque_curve, user_torque
 from ema_model.errors import InputError
 from ema_model.faults import HEALTHY
-from ema_model.identification.objective import Objective
+from ema_model.identification.search import Objective
 from ema_model.models import ClosedLoop, InverseDynamics
 from ema_model.recordings import Measurement
 from ema_model.simulation.plant import simulated

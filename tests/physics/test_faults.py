@@ -13,7 +13,7 @@ from ema_model.actuator.readings import readings, sentences
 from ema_model.commands import command
 from ema_model.errors import InputError
 from ema_model.faults import FAULTS, HEALTHY, NAMES, error_percent, performance_coefficient, physical, vector
-from ema_model.files.shipped import shipped_folder
+from ema_model.files.opened import shipped_folder
 from ema_model.simulation.run import Run, simulate_monitor, simulate_reference
 
 ACTUATOR = load_actuator()

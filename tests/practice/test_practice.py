@@ -17,7 +17,7 @@ from ema_model.lives import drawn, worn_life
 from ema_model.practice import made
 from ema_model.practice.kinds import KINDS
 from ema_model.recordings import read
-from ema_model.tracking.order import flights_in
+from ema_model.tracking.flights import flights_in
 from ema_model.tracking.track import track
 from ema_model.units.compare import compare_units
 from ema_model.units.folders import units_in

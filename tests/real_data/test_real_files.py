@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from ema_model.recordings import SideFile, guess_mapping, read_columns
-from ema_model.recordings.health.card import health
+from ema_model.recordings.health import health
 from ema_model.recordings.read import read_measurement
 
 DATA = Path(os.environ.get("EMAVIZ_DATA") or Path(__file__).resolve().parents[3] / "shared" / "data")

@@ -15,8 +15,8 @@ import pytest
 from rerun import chunk
 
 from emaviz.recording import RecordingError, RecordingWriter, entry
-from emaviz.recording.file import RrdFile
 from emaviz.recording.read import read
+from emaviz.recording.writer import RrdFile
 
 Usage = namedtuple("Usage", "total used free")
 reading = importlib.import_module("emaviz.recording.read")  # the package gives the function that name

@@ -6,7 +6,7 @@ import pytest
 from support.bombs import BOMBS, SLOW
 from support.reading_process import ReadingProcess
 
-from ema_model.files.limits import CHALLENGE_BYTES, FILE_BYTES, PAGE_BYTES
+from ema_model.files.opened import CHALLENGE_BYTES, FILE_BYTES, PAGE_BYTES
 
 ENDINGS = {"packed mat": ".mat", "side file": ".toml", "actuator": ".toml", "session": ".emaviz"}
 SMALL = 20_000_000  # bytes that a measurement may take here, so that the plain suite stays quick

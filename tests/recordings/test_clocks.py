@@ -8,8 +8,8 @@ from support.representative import first_of
 
 from ema_model.errors import InputError
 from ema_model.recordings import Measurement, parse_mapping, read_side_file, side_path, write_side_file
-from ema_model.recordings.health.card import health
-from ema_model.recordings.health.speed_lag import clock_drift, speed_lag
+from ema_model.recordings.health import health
+from ema_model.recordings.noise import clock_drift, speed_lag
 from ema_model.recordings.read import read_measurement
 from ema_model.recordings.side_file import SideFile
 

@@ -17,10 +17,10 @@ from ema_model.recordings import (
     can_have_current,
     with_equivalent_current,
 )
-from ema_model.recordings.health.card import health
+from ema_model.recordings.health import health
+from ema_model.recordings.measurement import Sensors
 from ema_model.recordings.read import prepared
 from ema_model.simulation.run import Run, simulate_reference
-from ema_model.simulation.sensors import Sensors
 
 ACTUATOR = load_actuator()
 PERIOD = 1e-3

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from ema_model.recordings import Measurement, write_measurement
-from ema_model.recordings.health.card import health
+from ema_model.recordings.health import health
 from ema_model.recordings.read import read_measurement
 
 

@@ -11,7 +11,7 @@ from support.mat_structs import write_dspace
 
 from ema_model.errors import InputError
 from ema_model.recordings import read_columns
-from ema_model.recordings.health.card import health
+from ema_model.recordings.health import health
 from ema_model.recordings.read import read_header, read_measurement
 
 POSITION, SPEED = "motor_position_rad", "motor_speed_rad_s"

@@ -14,8 +14,7 @@ import pytest
 
 from ema_model.comparison.result import Comparison
 from ema_model.errors import InputError
-from ema_model.recordings.health.card import Health
-from ema_model.recordings.health.finding import Finding
+from ema_model.recordings.health import Finding, Health
 from emaviz.report import write_report
 
 HOSTILE = '</script><script>window.bad = 1</script><img src="x" onerror="window.bad = 2">&amp;'

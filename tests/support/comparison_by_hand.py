@@ -16,9 +16,9 @@ from ema_model.comparison.residuals import Residuals, join
 from ema_model.comparison.result import Compared, Comparison, Region, SignalError
 from ema_model.estimation.calibrate import Calibrated, Calibration
 from ema_model.quantities.titles import unit_of
-from ema_model.recordings.health.card import health
+from ema_model.recordings.health import health
+from ema_model.recordings.measurement import Sensors
 from ema_model.simulation.run import Run, simulate_monitor, simulate_reference
-from ema_model.simulation.sensors import Sensors
 
 SIGNALS = ("current_A", "motor_position_rad", "user_position_rad")
 PER_BLOCK = 5

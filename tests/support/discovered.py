@@ -9,8 +9,8 @@ from ema_model.actuator import load_actuator
 from ema_model.commands import command
 from ema_model.discovery import Discovery, discover
 from ema_model.recordings import Measurement
+from ema_model.recordings.measurement import Sensors
 from ema_model.simulation.run import Run, simulate_reference
-from ema_model.simulation.sensors import Sensors
 
 HIDDEN = {"cogging_torque": {"amplitude_Nm": 0.02, "order": 12.0, "phase_rad": 0.7}}
 _RUNS = {

@@ -6,7 +6,7 @@ import numpy as np
 
 from ema_model import faults
 from ema_model.estimation.unknowns import to_vector
-from ema_model.tracking.flight import Flight
+from ema_model.tracking.flights import Flight
 
 
 def flights(k1, sigma=0.01, base=2, seed=0, common=None):

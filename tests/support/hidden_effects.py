@@ -12,8 +12,8 @@ from ema_model.commands import command
 from ema_model.estimation import default_free
 from ema_model.faults import vector
 from ema_model.recordings import Measurement
+from ema_model.recordings.measurement import Sensors
 from ema_model.simulation.run import Run, simulate_reference
-from ema_model.simulation.sensors import Sensors
 
 ACTUATOR = load_actuator()
 SINE = ("sine", {"amplitude_rad": 0.03, "frequency_Hz": 3}, 1.0)  # several turns of the motor, slowly

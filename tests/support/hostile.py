@@ -12,8 +12,8 @@ from ema_model.actuator import load_actuator, save_actuator
 from ema_model.challenges.challenge import HIDDEN, write_sealed
 from ema_model.commands import command
 from ema_model.recordings import write_measurement
+from ema_model.recordings.measurement import Sensors
 from ema_model.simulation.run import Run, simulate_reference
-from ema_model.simulation.sensors import Sensors
 from emaviz.recording import RecordingWriter
 from emaviz.session.data_folder import DataFolder
 

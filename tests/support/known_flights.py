@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from ema_model.recordings import Measurement, write_measurement
-from ema_model.tracking.flight import Flight
+from ema_model.tracking.flights import Flight
 
 FOLLOWING = "emaviz.session.track"
 

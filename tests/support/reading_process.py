@@ -75,9 +75,9 @@ class ReadingProcess:
 def _measurement(path: Path, most_bytes: int) -> None:
     import emaviz  # noqa: F401  which adds formats
     from ema_model.errors import InputError
-    from ema_model.files.limits import PAGE_BYTES
+    from ema_model.files.opened import PAGE_BYTES
     from ema_model.recordings import read_columns
-    from ema_model.recordings.health.card import health
+    from ema_model.recordings.health import health
     from ema_model.recordings.read import read_measurement
 
     refused = None
@@ -146,7 +146,7 @@ def _challenge(path: Path, _: int) -> None:
     from ema_model.actuator import load_actuator
     from ema_model.challenges import opened, sealed_challenge
     from ema_model.challenges.truth import unseal
-    from ema_model.files.limits import CHALLENGE_RECORDING_BYTES
+    from ema_model.files.opened import CHALLENGE_RECORDING_BYTES
     from ema_model.recordings import read
 
     with opened(sealed_challenge(path)) as one:

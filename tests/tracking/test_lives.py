@@ -10,7 +10,7 @@ from ema_model.actuator import load_actuator
 from ema_model.errors import InputError
 from ema_model.estimation.unknowns import to_vector
 from ema_model.identification.fit import refine, setting
-from ema_model.identification.objective import Objective
+from ema_model.identification.search import Objective
 from ema_model.identification.uncertainty import uncertainty
 from ema_model.lives import LAWS, healthy_life, recorded, worn_life
 from ema_model.lives.life import base_of, unit_of

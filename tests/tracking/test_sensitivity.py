@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ema_model.lives.life import WORN_AT, accuracy
-from ema_model.tracking.sensitivity import growth
+from ema_model.tracking.series import growth
 
 
 def test_it_grows_as_identifications_of_worn_actuators_have_it():

@@ -31,7 +31,7 @@ def test_all_outputs(folder, tmp_path, monkeypatch, capsys):
     """The identification, which takes seconds a flight, is replaced by a drawn life's."""
     life = worn_life("linear", 1)
     flights = drawn(life)[: int(0.6 * life.flights)]
-    monkeypatch.setattr("ema_model.tracking.identify.identify_all", lambda *_: iter(flights))
+    monkeypatch.setattr("ema_model.tracking.flights.identify_all", lambda *_: iter(flights))
     written = [tmp_path / name for name in ("track.json", "track.html", "track.rrd")]
     options = [text for name, path in zip(("--json", "--report", "--record"), written) for text in (name, str(path))]
     assert main(["track", str(folder), "--threshold", f"{life.fault}={life.threshold}", *options]) == 0
@@ -91,7 +91,7 @@ def test_flights_that_arrive_are_taken_up(folder, tmp_path, monkeypatch, capsys)
     told = tmp_path / "track.json"
     flights = drawn(worn_life("linear", 1))
     monkeypatch.setattr(
-        "ema_model.tracking.identify.identify_all",
+        "ema_model.tracking.flights.identify_all",
         lambda paths, *_: (replace(flights[int(path.stem[7:])], name=path.stem) for path in paths),
     )
     seen = []

@@ -10,8 +10,8 @@ from ema_model import faults
 from ema_model.estimation.unknowns import to_vector
 from ema_model.lives import drawn, worn_life
 from ema_model.lives.life import base_of
+from ema_model.tracking.series import Unit
 from ema_model.tracking.track import Tracker, track
-from ema_model.tracking.unit import Unit
 
 HEALTHY = to_vector(faults.HEALTHY)
 ONE_SIDED = np.arange(8) < 5

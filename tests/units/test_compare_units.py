@@ -15,9 +15,8 @@ from ema_model.recordings import Measurement
 from ema_model.units import fit as fitting
 from ema_model.units.block import linearised, unit_of, wider
 from ema_model.units.compare import compare_units
-from ema_model.units.fit import fit
+from ema_model.units.fit import At, fit, simpler
 from ema_model.units.result import as_dict, notes, sentences
-from ema_model.units.step import At, simpler
 
 ACTUATOR = load_actuator()
 BACKLASH = "transmission.backlash_rad"

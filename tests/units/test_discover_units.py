@@ -8,8 +8,7 @@ import pytest
 
 from ema_model.actuator import load_actuator
 from ema_model.fleets import draw, recorded
-from ema_model.units.discovery import discover_units
-from ema_model.units.discovery.words import sentences
+from ema_model.units.discovery import discover_units, sentences
 
 ACTUATOR = load_actuator()
 BACKLASH = "transmission.backlash_rad"

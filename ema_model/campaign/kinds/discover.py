@@ -1,20 +1,50 @@
-"""Which effects are missing: the verdict, what was added, the error ladder."""
+"""Discoveries of hidden effects, and whether anyone could see them."""
 
 from __future__ import annotations
 
 import json
 from collections import Counter
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from typing import Any
 
+import numpy as np
 import pyarrow as pa
 
+from ema_model.actuator import Actuator
 from ema_model.campaign.axes import Given
 from ema_model.campaign.kinds.kind import FLAG, NUMBER, NUMBERS, TEXT, TEXTS, Kind
-from ema_model.campaign.showable import showable
+from ema_model.comparison.compare import weights_of
 from ema_model.comparison.criteria import BAND
 from ema_model.discovery import as_dict, discover
 from ema_model.errors import InputError, quoted
+from ema_model.estimation.calibrate import problem_of
+from ema_model.estimation.model_fit import fit, gather
+from ema_model.recordings import Measurement, prepared
+
+# --- how much hidden effects change recordings beyond what the tolerances can: whether anyone could see them ----------
+
+
+def showable(
+    recordings: Sequence[Measurement],
+    actuator: Actuator,
+    effects: Mapping[str, Mapping[str, float]],
+    signals: Sequence[str] | None = None,
+) -> float:
+    """Expected fall of χ² at the effects' true settings."""
+    data = gather([prepared(one, actuator) for one in recordings], actuator, weights_of(signals, actuator), None)
+    data = data.beside(fit(data, actuator))
+    base = fit(data, actuator)
+    x = base.calibration.x
+    with_them = data.plant(replace(actuator, effects={name: dict(given) for name, given in effects.items()}))
+    problem = problem_of(with_them, data.floors, signals=data.signals)
+    change = problem.residuals(x[None, :])[0, : problem.values] - base.residual
+    columns = base.calibration.weighted_jacobian
+    own = change - columns @ np.linalg.solve(columns.T @ columns + np.eye(len(x)), columns.T @ change)
+    return float(change @ own)
+
+
+# --- which effects are missing: the verdict, what was added, the error ladder -----------------------------------------
 
 _LARGEST_GROUP = 3  # of effects that cannot be told apart, with which a name is still an answer
 _SIGNALS = {"all": None, "current": ["current_A"]}

@@ -13,8 +13,8 @@ from ema_model import faults
 from ema_model.campaign.axes import Given
 from ema_model.campaign.kinds.kind import FLAG, NUMBER, NUMBERS, TEXT, TEXTS, Kind
 from ema_model.errors import InputError, quoted
-from ema_model.identification.objective import Objective
 from ema_model.identification.run import ALGORITHMS, ROBUST, identify
+from ema_model.identification.search import Objective
 from ema_model.simulation.plant import FITNESSES
 
 

@@ -24,7 +24,7 @@ from ema_model.models.measured_motion import fit_stretches
 from ema_model.recordings import Measurement
 from ema_model.recordings.read import check_same_actuator, prepared
 from ema_model.recordings.recording_set import check_held_out
-from ema_model.simulation.one_stack import compile_library
+from ema_model.simulation.compiled import compile_library
 
 Progress = Callable[[str], None]
 

@@ -34,7 +34,7 @@ from ema_model.estimation.model_fit import Data, Fit, as_in, fit, in_floors_of, 
 from ema_model.faults import NAMES as FAULTS
 from ema_model.faults import cause_of
 from ema_model.side_by_side import fits
-from ema_model.simulation.one_stack import compile_behind
+from ema_model.simulation.compiled import compile_behind
 
 Progress = Callable[[str], None]
 Array = NDArray[np.float64]

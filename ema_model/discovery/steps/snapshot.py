@@ -9,9 +9,8 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from ema_model.comparison.assemble import residuals_of
 from ema_model.comparison.explain import Explanation
-from ema_model.comparison.residuals import Residuals
+from ema_model.comparison.residuals import Residuals, residuals_of
 from ema_model.discovery.candidates.alike import alike
 from ema_model.discovery.criteria import LEAST_BIC
 from ema_model.discovery.evidence.remaining import Left

@@ -17,15 +17,13 @@ import pyarrow.csv as csv
 import pyarrow.csv as pc
 
 from ema_model.errors import InputError, quoted
-from ema_model.files.limits import LINE_BYTES, megabytes
-from ema_model.files.opened import listed, refusal, shown
+from ema_model.files.opened import LINE_BYTES, listed, megabytes, refusal, shown
 from ema_model.quantities.signals import SIGNALS
 from ema_model.quantities.units import find_unit
 from ema_model.recordings.column_names import is_time, readings
-from ema_model.recordings.formats.channels import with_unit
+from ema_model.recordings.formats.channels import beside_time, tokens, with_unit
 from ema_model.recordings.formats.clocks import Clocks, between, covered, is_state, main_clock, rule
 from ema_model.recordings.formats.format import Array, Columns, Format, check_size
-from ema_model.recordings.formats.own_clocks import beside_time, tokens
 from ema_model.recordings.formats.stamps import is_stamp, seconds
 from ema_model.recordings.formats.text_layout import (
     SEPARATORS,

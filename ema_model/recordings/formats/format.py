@@ -8,8 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ema_model.files.limits import megabytes
-from ema_model.files.opened import refusal
+from ema_model.files.opened import megabytes, refusal
 from ema_model.recordings.formats.clocks import Clocks
 from ema_model.recordings.formats.text_layout import Head, Hints
 

@@ -10,8 +10,7 @@ from contextlib import contextmanager
 from dataclasses import replace
 
 from ema_model.errors import InputError
-from ema_model.files.limits import megabytes
-from ema_model.files.opened import refusal
+from ema_model.files.opened import megabytes, refusal
 from ema_model.recordings.formats.format import Columns, Format
 from ema_model.recordings.formats.text_layout import Head, Hints
 

@@ -13,8 +13,7 @@ from typing import Any
 import numpy as np
 
 from ema_model.errors import InputError
-from ema_model.files.limits import ARRAYS
-from ema_model.files.opened import listed, refusal, shown
+from ema_model.files.opened import ARRAYS, listed, refusal, shown
 from ema_model.recordings.formats.channels import Channel, Log, Matrix, NoLog, in_columns, without_ones
 from ema_model.recordings.formats.logs import log_format
 

@@ -14,13 +14,11 @@ from typing import Any
 
 from ema_model.files import sandbox
 from ema_model.files.opened import listed, refusal, shown
-from ema_model.recordings.formats import common_clock
-from ema_model.recordings.formats.channels import Log, NoLog, told
+from ema_model.recordings.formats import channels
+from ema_model.recordings.formats.channels import Log, NoLog, told, with_own_clocks, with_runs
 from ema_model.recordings.formats.clocks import Clocks
 from ema_model.recordings.formats.format import Array, Columns, Format
 from ema_model.recordings.formats.npz import check_lengths
-from ema_model.recordings.formats.own_clocks import with_own_clocks
-from ema_model.recordings.formats.run_groups import with_runs
 
 _PATIENCE_S = 20.0  # for one question; some libraries never end
 INSTALL = "pip install 'emaviz[rigs]'"
@@ -62,7 +60,7 @@ _last: tuple[object, Log, ExitStack] | None = None  # the file that is looked at
 
 def names_of(module: str, path: str, max_bytes: int) -> tuple[list[str], list[Array]]:
     """The columns' names; asked in the process of its own."""
-    return list(common_clock.offered(path, _opened(module, path, max_bytes))), []
+    return list(channels.offered(path, _opened(module, path, max_bytes))), []
 
 
 def columns_of(
@@ -76,7 +74,7 @@ def columns_of(
     if log.left_aside:
         notes.append(f"left aside, as they are no columns of numbers: {listed(log.left_aside)}")
     with _told(module, path):
-        arrays, done, clocks = common_clock.taken(path, log, names, max_bytes, strict)
+        arrays, done, clocks = channels.taken(path, log, names, max_bytes, strict)
     if strict:
         _close()
     parts = (dict(clocks.of), clocks.main, clocks.rule) if clocks else None

@@ -15,14 +15,14 @@ from typing import BinaryIO
 import numpy as np
 from numpy.typing import NDArray
 
-from ema_model.files.limits import ARRAYS, megabytes
-from ema_model.files.opened import refusal, shown
+from ema_model.files.opened import ARRAYS, megabytes, refusal, shown
 from ema_model.quantities.signals import SIGNALS
-from ema_model.recordings.formats import common_clock, hdf5
+from ema_model.recordings.formats import hdf5
 from ema_model.recordings.formats.channels import (
     Channel,
     Log,
     column_names_of,
+    offered,
     times_of,
     told,
     way_of_time,
@@ -305,7 +305,7 @@ def _header(path: str, max_bytes: int) -> list[str]:
         return hdf5.FORMAT.header(path, max_bytes)
     arrays = _load(path, max_bytes)
     log = _put_together(arrays)
-    return list(common_clock.offered(path, log)) if log else column_names(path, _kinds(arrays))
+    return list(offered(path, log)) if log else column_names(path, _kinds(arrays))
 
 
 def _read(path: str, names: Sequence[str], max_bytes: int, strict: bool) -> Columns:

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from ema_model.files.limits import ARRAYS
+from ema_model.files.opened import ARRAYS
 from ema_model.recordings.formats.channels import Channel, Log, NoLog, broken_file
 from ema_model.recordings.formats.logs import log_format
 

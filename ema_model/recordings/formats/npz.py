@@ -14,23 +14,23 @@ from numpy.lib import format as npy
 from numpy.typing import NDArray
 
 from ema_model.errors import InputError
-from ema_model.files.limits import ARRAYS
-from ema_model.files.opened import Damaged, Member, Refused, SafeZip, listed, opened_zip, refusal, shown
+from ema_model.files.opened import ARRAYS, Damaged, Member, Refused, SafeZip, listed, opened_zip, refusal, shown
 from ema_model.quantities.signals import SIGNALS
 from ema_model.recordings.column_names import is_time
-from ema_model.recordings.formats import common_clock
 from ema_model.recordings.formats.channels import (
     Channel,
     Log,
     column_names_of,
+    offered,
+    taken,
     times_of,
     way_of_time,
+    with_own_clocks,
+    with_runs,
     without_columns,
     without_ones,
 )
 from ema_model.recordings.formats.format import Array, Columns, Format, check_size
-from ema_model.recordings.formats.own_clocks import with_own_clocks
-from ema_model.recordings.formats.run_groups import with_runs
 
 # --- named arrays of any shape, as .npz and .mat files hold them, turned into columns ---------------------------------
 
@@ -135,7 +135,7 @@ def put_together(channels: Sequence[Channel], aside: Sequence[str]) -> Log | Non
 
 def together(path: str, log: Log, names: Sequence[str], max_bytes: int, strict: bool) -> Columns:
     """Columns of such a log on one clock; raises InputError as a format's `read` does."""
-    arrays, notes, clocks = common_clock.taken(path, log, names, max_bytes, strict)
+    arrays, notes, clocks = taken(path, log, names, max_bytes, strict)
     if strict:
         check_lengths(path, arrays)
     aside = [f"left aside, as they are no columns of numbers: {listed(log.left_aside)}"] if log.left_aside else []
@@ -170,7 +170,7 @@ def _header(path: str, max_bytes: int) -> list[str]:
         places = _contents(path, archive)
         kinds = {name: place.kind for name, place in places.items()}
         log = _log(path, archive, places, kinds, max_bytes)
-        return list(common_clock.offered(path, log)) if log else column_names(path, kinds)
+        return list(offered(path, log)) if log else column_names(path, kinds)
 
 
 def _read(path: str, names: Sequence[str], max_bytes: int, strict: bool) -> Columns:

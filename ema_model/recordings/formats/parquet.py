@@ -14,8 +14,7 @@ import pyarrow.compute
 import pyarrow.parquet as pq
 
 from ema_model.errors import quoted
-from ema_model.files.limits import COLUMNS, megabytes
-from ema_model.files.opened import refusal, shown
+from ema_model.files.opened import COLUMNS, megabytes, refusal, shown
 from ema_model.recordings.formats import robot_dataset
 from ema_model.recordings.formats.channels import MOST_COLUMNS
 from ema_model.recordings.formats.format import Array, Columns, Format, check_size

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any
 
-from ema_model.files.limits import ARRAYS
+from ema_model.files.opened import ARRAYS
 from ema_model.recordings.formats.channels import Channel, Log, NoLog, broken_file
 from ema_model.recordings.formats.logs import log_format
 

@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING
 
 from ema_model.errors import InputError
 from ema_model.files.opened import shown
-from emaviz.cli import files, options
-from emaviz.cli.interrupt import PartialAnswer
+from emaviz.cli import options
+from emaviz.cli.ending import PartialAnswer
 from emaviz.cli.options import whole
 
 if TYPE_CHECKING:
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 HELP = "compute the many tasks of a plan, in processes or on a Dask cluster; status and report of one"
 PLACE = 11
 _STATUS, _REPORT = "status", "report"
-_PLAN = files.Input("a plan (.toml)", is_file=lambda name: bool(Path(name).suffix))
+_PLAN = options.Input("a plan (.toml)", is_file=lambda name: bool(Path(name).suffix))
 
 
 def _address(text: str) -> str:
@@ -41,8 +41,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "       emaviz campaign status|report DIR [--json FILE.json]"
     )
     parser.add_argument("plan", type=_PLAN, metavar="PLAN", help="its file, or a shipped one's name; or status, report")
-    parser.add_argument("folder", nargs="?", type=files.Folder(), metavar="DIR", help="of status and report")
-    parser.add_argument("--out", dest="out", type=files.Folder(), metavar="DIR", help="where the rows are kept")
+    parser.add_argument("folder", nargs="?", type=options.Folder(), metavar="DIR", help="of status and report")
+    parser.add_argument("--out", dest="out", type=options.Folder(), metavar="DIR", help="where the rows are kept")
     parser.add_argument(
         "--scheduler",
         type=_address,

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 from ema_model.errors import InputError, did_you_mean, quoted
 from ema_model.files.opened import shown
-from emaviz.cli import files
+from emaviz.cli import options
 
 if TYPE_CHECKING:
     from ema_model.challenges import Challenge
@@ -21,7 +21,7 @@ PLACE = 8
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """NAME, --out, --reveal."""
     parser.add_argument("name", nargs="?", metavar="NAME", help="one of the list, which stands there without a name")
-    parser.add_argument("--out", type=files.Folder(), metavar="DIR", help="a new folder for its recordings")
+    parser.add_argument("--out", type=options.Folder(), metavar="DIR", help="a new folder for its recordings")
     parser.add_argument("--reveal", action="store_true", help="tell what is hidden in it")
 
 

@@ -8,7 +8,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 from ema_model.errors import InputError
-from emaviz.cli import files, options
+from emaviz.cli import options
 
 if TYPE_CHECKING:
     from ema_model.recordings import Measurement
@@ -20,7 +20,7 @@ PLACE = 4
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """The options of INTERFACES, with the signals to fit."""
-    files.add_recordings(parser, "compared", declared=files.UNITS)
+    options.add_recordings(parser, "compared", declared=options.UNITS)
     options.add_units(parser)
     options.add_fit(parser, "the comparison")
     parser.add_argument(

@@ -6,8 +6,8 @@ import argparse
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
-from emaviz.cli import files, options
-from emaviz.cli.interrupt import PartialAnswer
+from emaviz.cli import options
+from emaviz.cli.ending import PartialAnswer
 from emaviz.cli.options import whole
 
 if TYPE_CHECKING:
@@ -21,7 +21,7 @@ _CURRENT_ONLY = ("current_A",)
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """The options of INTERFACES."""
-    files.add_recordings(parser, "fitted", declared=files.UNITS)
+    options.add_recordings(parser, "fitted", declared=options.UNITS)
     options.add_units(parser)
     options.add_fit(parser, "the discovery")
     parser.add_argument("--signals", choices=("current", "all"), default="all", help="what is fitted")
@@ -33,7 +33,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def documents() -> tuple[type, ...]:
     """What --json holds: of recordings, and of units beside each other."""
     from ema_model.discovery.words import DiscoveryJson
-    from ema_model.units.discovery.summary import UnitsDiscoveredJson
+    from ema_model.units.discovery import UnitsDiscoveredJson
 
     return (DiscoveryJson, UnitsDiscoveredJson)
 

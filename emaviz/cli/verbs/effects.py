@@ -8,7 +8,7 @@ from dataclasses import asdict
 from typing import TYPE_CHECKING, cast
 
 from ema_model.quantities.axes import Axes
-from emaviz.cli import files
+from emaviz.cli import options
 from emaviz.cli.options import add_json, effect_name
 
 if TYPE_CHECKING:
@@ -23,7 +23,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """NAME, --html and --json."""
     parser.add_argument("name", nargs="?", type=effect_name, metavar="NAME", help="one effect; all without it")
     parser.add_argument(
-        "--html", type=files.Folder(), metavar="DIR", help="write the library as pages, with typeset equations"
+        "--html", type=options.Folder(), metavar="DIR", help="write the library as pages, with typeset equations"
     )
     add_json(parser)
 

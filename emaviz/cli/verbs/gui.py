@@ -5,8 +5,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from emaviz.cli.files import RECORDING, Folder
-from emaviz.cli.options import add_actuator, whole
+from emaviz.cli.options import RECORDING, Folder, add_actuator, whole
 
 HELP = "the app in the browser (also without a command)"
 PLACE = 1

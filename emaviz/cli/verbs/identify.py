@@ -10,16 +10,16 @@ from typing import TYPE_CHECKING, Any
 
 from ema_model.errors import InputError
 from ema_model.members import stated, stated_in
-from emaviz.cli import files, options
-from emaviz.cli.interrupt import PartialAnswer
+from emaviz.cli import options
+from emaviz.cli.ending import PartialAnswer
 from emaviz.cli.options import whole
 
 if TYPE_CHECKING:
     import numpy as np
 
     from ema_model.actuator import Actuator
-    from ema_model.identification.objective import Objective
     from ema_model.identification.run import Progress
+    from ema_model.identification.search import Objective
     from ema_model.recordings import Measurement
     from emaviz.cli import flow, output
 
@@ -32,7 +32,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     robust = stated_in("ema_model.identification.run", "ROBUST")
     algorithms = (robust, *stated("ema_model.identification.optimisers", "name").values())
     fitnesses = stated_in("ema_model.simulation.plant", "FITNESSES")
-    files.add_recordings(parser, "fitted", nargs="*")
+    options.add_recordings(parser, "fitted", nargs="*")
     parser.add_argument(
         "--algorithm", choices=algorithms, default=robust, help="robust, or one of the thesis's as published"
     )
@@ -51,7 +51,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def documents() -> tuple[type, ...]:
     """What --json holds: of a whole identification, and of one that was interrupted."""
-    from ema_model.identification.summary import IdentificationJson, IdentifiedSoFarJson
+    from ema_model.identification.words import IdentificationJson, IdentifiedSoFarJson
 
     return (IdentificationJson, IdentifiedSoFarJson)
 
@@ -94,9 +94,9 @@ def _identified(
         from ema_model.discovery.steps.begin import with_fitted_effects
 
         actuator = with_fitted_effects(fitted, actuator, to_fit, progress.show)
-    from ema_model.identification.objective import Objective
     from ema_model.identification.run import SEARCH_SHARE, identify
-    from ema_model.identification.summary import as_dict
+    from ema_model.identification.search import Objective
+    from ema_model.identification.words import as_dict
     from emaviz.cli import flow
 
     def fitness(of: list[Measurement]) -> Objective:
@@ -173,7 +173,7 @@ def _say_so_far(history: list[Progress], actuator: Actuator, arguments: argparse
     from ema_model.actuator.readings import sentences
     from ema_model.faults import NAMES
     from ema_model.identification.run import algorithm_title
-    from ema_model.identification.summary import so_far_as_dict
+    from ema_model.identification.words import so_far_as_dict
     from ema_model.quantities.numbers import amount
     from emaviz.cli import output
 
@@ -190,8 +190,8 @@ def _say_so_far(history: list[Progress], actuator: Actuator, arguments: argparse
 def _simulated(arguments: argparse.Namespace, actuator: Actuator, truth: np.ndarray | None) -> Measurement:
     """The run that the options ask for, as the sensors have it."""
     assert truth is not None
+    from ema_model.recordings.measurement import Sensors
     from ema_model.simulation.plant import simulated
-    from ema_model.simulation.sensors import Sensors
     from emaviz.cli import given
 
     sensors = Sensors(arguments.noise_current, arguments.encoder_bits)

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ema_model.errors import InputError
-from emaviz.cli import files, options
+from emaviz.cli import options
 
 if TYPE_CHECKING:
     from emaviz.cli.documents import RecoveredJson
@@ -18,10 +18,12 @@ PLACE = 10
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """FILE.part, --out, --json."""
-    parser.add_argument("file", type=files.Input("a recording that was cut off (.part)"), metavar="FILE.part")
-    parser.add_argument("--out", type=files.RRD, metavar="FILE.rrd", help="its name; without it, FILE's without .part")
+    parser.add_argument("file", type=options.Input("a recording that was cut off (.part)"), metavar="FILE.part")
+    parser.add_argument(
+        "--out", type=options.RRD, metavar="FILE.rrd", help="its name; without it, FILE's without .part"
+    )
     options.add_json(parser)
-    files.add_force(parser)
+    options.add_force(parser)
 
 
 def documents() -> tuple[type, ...]:

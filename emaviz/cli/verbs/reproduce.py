@@ -7,20 +7,20 @@ from contextlib import suppress
 from pathlib import Path
 
 from ema_model.errors import InputError
-from emaviz.cli import files, options
-from emaviz.cli.interrupt import PartialAnswer
+from emaviz.cli import options
+from emaviz.cli.ending import PartialAnswer
 from emaviz.cli.options import whole
 
 HELP = "compute the thesis's evaluation anew, and set its numbers beside ours"
 PLACE = 12
-_PLAN = files.Input("a plan (.toml)", is_file=lambda name: bool(Path(name).suffix))
+_PLAN = options.Input("a plan (.toml)", is_file=lambda name: bool(Path(name).suffix))
 REPORT, RECORDING = "reproduce.html", "reproduce.rrd"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """--out, --quick, --workers; --plan for a plan of one's own with the same groups."""
     parser.add_argument(
-        "--out", required=True, type=files.Folder(), metavar="DIR", help="where the rows, the report and the .rrd go"
+        "--out", required=True, type=options.Folder(), metavar="DIR", help="where the rows, the report and the .rrd go"
     )
     which = parser.add_mutually_exclusive_group()
     which.add_argument("--quick", action="store_true", help="one run of each in place of ten: minutes, not an hour")

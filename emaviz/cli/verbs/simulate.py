@@ -7,7 +7,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from ema_model.errors import InputError
-from emaviz.cli import files, options
+from emaviz.cli import options
 from emaviz.cli.options import FINITE
 
 if TYPE_CHECKING:
@@ -27,7 +27,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--circuit", choices=("reduced", "thesis"), default="reduced", help="of the monitor model")
     parser.add_argument(
         "--input",
-        type=files.RECORDING,
+        type=options.RECORDING,
         metavar="RUN.csv",
         help="open loop: a recording whose current, torque, force, voltage or duty is put in, in place of a command",
     )
@@ -38,11 +38,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     options.add_effects(parser)
     parser.add_argument("--sample-rate", type=FINITE, default=10_000.0, metavar="Hz")
     parser.add_argument(
-        "--out", required=True, type=files.MEASUREMENT, metavar="FILE.csv|.parquet", help="the recording to write"
+        "--out", required=True, type=options.MEASUREMENT, metavar="FILE.csv|.parquet", help="the recording to write"
     )
     options.add_record(parser, "it as well")
     options.add_json(parser)
-    files.add_force(parser)
+    options.add_force(parser)
 
 
 def documents() -> tuple[type, ...]:
@@ -58,7 +58,7 @@ def run(arguments: argparse.Namespace) -> int:
 
     from ema_model.actuator.readings import readings
     from ema_model.recordings import write_measurement
-    from ema_model.simulation.sensors import Sensors
+    from ema_model.recordings.measurement import Sensors
     from emaviz.cli import given, output
 
     actuator = given.actuator_of(arguments)

@@ -10,17 +10,17 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ema_model.errors import InputError, quoted
-from emaviz.cli import files, options
-from emaviz.cli.interrupt import PartialAnswer
+from emaviz.cli import options
+from emaviz.cli.ending import PartialAnswer
 
 if TYPE_CHECKING:
     from ema_model.actuator import Actuator
-    from ema_model.tracking.flight import Flight
+    from ema_model.tracking.flights import Flight
     from emaviz.cli import output
 
 HELP = "follow k over the flights of one unit: what drifts, and what life remains"
 PLACE = 6
-_FLIGHT = files.Input("the file of a measurement", has_side_file=True, is_file=lambda name: not Path(name).is_dir())
+_FLIGHT = options.Input("the file of a measurement", has_side_file=True, is_file=lambda name: not Path(name).is_dir())
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -47,7 +47,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     options.add_record(parser, "k over the flights")
     options.add_report(parser)
     options.add_json(parser)
-    files.add_force(parser)
+    options.add_force(parser)
     options.add_seed(parser)
 
 
@@ -99,7 +99,7 @@ def run(arguments: argparse.Namespace) -> int:
 def _identified(
     paths: Sequence[Path], arguments: argparse.Namespace, actuator: Actuator, progress: output.Progress
 ) -> Iterator[Flight]:
-    from ema_model.tracking.identify import identify_all
+    from ema_model.tracking.flights import identify_all
     from emaviz.cli import given
 
     return identify_all(
@@ -150,7 +150,7 @@ def _watch(
     from ema_model.files.arriving import LOOK_S, Watched
     from ema_model.recordings.recording_set import recordings_in
     from ema_model.tracking.evidence import LEAST_FLIGHTS
-    from ema_model.tracking.order import check_order, in_order
+    from ema_model.tracking.flights import check_order, in_order
     from emaviz.cli import given
 
     folder = Path(arguments.files[0])
@@ -199,7 +199,7 @@ def _paths(names: list[str]) -> list[Path]:
     folders = [path for path in named if path.is_dir()]
     if folders and len(named) > 1:
         raise InputError(f"{quoted(folders[0])}: is a folder; name one folder alone, or files")
-    from ema_model.tracking.order import check_enough, check_order, flights_in
+    from ema_model.tracking.flights import check_enough, check_order, flights_in
 
     paths = flights_in(folders[0]) if folders else named
     check_order(paths)

@@ -5,8 +5,7 @@ from __future__ import annotations
 import argparse
 
 from ema_model.errors import InputError
-from emaviz.cli.files import Input
-from emaviz.cli.options import whole
+from emaviz.cli.options import Input, whole
 
 HELP = "open a .rrd recording in the Rerun viewer (in the browser, no network needed)"
 PLACE = 9

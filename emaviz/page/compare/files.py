@@ -13,7 +13,7 @@ from ema_model.quantities.units import known_units
 from ema_model.recordings import SIGNALS, ColumnMapping, MappedColumn
 from ema_model.recordings.columns import WITHOUT_DELAY
 from ema_model.recordings.formats.text_layout import ENCODINGS, Hints
-from ema_model.recordings.health.card import Finding, Health
+from ema_model.recordings.health import Finding, Health
 from ema_model.text import COLOURS
 from emaviz.page.page import Page
 from emaviz.server.viser_private import selector_of

@@ -25,12 +25,12 @@ from emaviz.figures import comparison as comparison_figures
 from emaviz.figures.theme import why_missing
 from emaviz.page.compare import WORKSPACE
 from emaviz.page.compare.files import RawLines
-from emaviz.page.inset import ALL_COLUMNS, COLUMNS, NEXT_COLUMN, PLOTS_EARLY, ROOM
+from emaviz.page.docked import ALL_COLUMNS, COLUMNS, NEXT_COLUMN, PLOTS_EARLY, ROOM
 from emaviz.page.page import Page
 from emaviz.page.panel import Cleared
 from emaviz.page.playback import PlaybackStrip
 from emaviz.page.style import IN_PAIRS
-from emaviz.scene.motion import Motion, motion
+from emaviz.scene.playback import Motion, motion
 from emaviz.server.viser_private import selector_of
 from emaviz.session.files import Opened
 from emaviz.text.html import Html, add_html, begin, html, joined, note, unescaped

@@ -23,17 +23,16 @@ from emaviz.page.compare.files import MappingStep, RawLines, health_card, record
 from emaviz.page.compare.result import ResultPanel
 from emaviz.page.page import Page
 from emaviz.page.panel import RECORD, REPORT, JobLine, KeepButtons, Lead, Leads
-from emaviz.page.standing import Standing
 from emaviz.page.style import LONG_LABELS
-from emaviz.page.tab import Shared, Tab
+from emaviz.page.tab import Shared, Standing, Tab
 from emaviz.recording.viewer import ViewerHost
 from emaviz.server.uploads import Uploads
 from emaviz.session.compare import COMPARABLE, LAY_OUT, MAP, OPEN, Comparing
 from emaviz.session.data_folder import ACTUATOR_SUFFIX
-from emaviz.session.described import taken
 from emaviz.session.discover.discovering import Discovering
 from emaviz.session.files import UPLOADED, Description, Opened, Question
 from emaviz.session.saved import Part
+from emaviz.session.settings import taken
 from emaviz.text.html import Html, HtmlPiece, add_html, html, joined
 
 # --- what a comparison is asked for: the actuator, what may be calibrated, the signals' weights, the window -----------

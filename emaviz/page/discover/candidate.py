@@ -27,8 +27,8 @@ from ema_model.quantities.titles import in_sentence
 from ema_model.text import COLOURS
 from emaviz.figures import discovery
 from emaviz.page.page import Page
-from emaviz.session.described import number as setting_number
 from emaviz.session.discover.discovering import Discovering, Preview, Typed, typed
+from emaviz.session.settings import number as setting_number
 from emaviz.text.html import BOX, Html, add_html, boxed, html, joined, mathml, note, unescaped
 
 # --- texts and styles of the Discover tab's cards: what each candidate would do, in one glance ------------------------

@@ -32,11 +32,11 @@ from emaviz.figures import discovery
 from emaviz.figures.discovery import equation
 from emaviz.page.discover import WORKSPACE
 from emaviz.page.discover.candidate import CONFIG, EffectView
-from emaviz.page.inset import COLUMNS, NEXT_COLUMN
+from emaviz.page.docked import COLUMNS, NEXT_COLUMN
 from emaviz.page.page import Page
 from emaviz.page.panel import Cleared
 from emaviz.page.playback import PlaybackStrip
-from emaviz.scene.motion import motion
+from emaviz.scene.playback import motion
 from emaviz.session.discover import source
 from emaviz.session.discover.discovering import Discovering
 from emaviz.text.html import BOX, Html, add_html, begin, boxed, html, joined, note

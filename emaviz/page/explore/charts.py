@@ -23,8 +23,7 @@ from emaviz.page.style import TIME_CHARTS, WIDE_MODAL, play_head
 from emaviz.scene.playback import FIRST
 from emaviz.server.safe_server import SCENES
 from emaviz.session.data_folder import DataFolder
-from emaviz.session.fan import Fan
-from emaviz.session.session import Simulation
+from emaviz.session.session import Fan, Simulation
 from emaviz.session.worker import Worker
 from emaviz.text.html import add_html, html, said
 

@@ -20,12 +20,12 @@ from ema_model.commands import COMMANDS
 from ema_model.discovery.result import Experiment
 from ema_model.effects import CATALOGUE, find
 from ema_model.faults import FAULTS, HEALTHY, vector
-from ema_model.identification.next_experiment import Suggestion
+from ema_model.identification.uncertainty import Suggestion
 from ema_model.quantities.shown import of_signal
 from ema_model.quantities.sides import USER
 from ema_model.quantities.titles import labelled
 from ema_model.simulation import plant
-from ema_model.simulation.load_profile import SHAPES
+from ema_model.simulation.run import SHAPES
 from ema_model.text import COLOURS
 from emaviz.page.explore import WORKSPACE
 from emaviz.page.explore.charts import ChartsPanel, ExportControls
@@ -33,12 +33,10 @@ from emaviz.page.page import Page
 from emaviz.page.panel import JobLine
 from emaviz.page.style import LONG_LABELS
 from emaviz.page.tab import Shared, Tab
-from emaviz.session.described import limits
 from emaviz.session.discover.source import Sealing
 from emaviz.session.saved import recovered
 from emaviz.session.session import Simulation
-from emaviz.session.settings import MONITORS, Settings
-from emaviz.session.undo import Undo
+from emaviz.session.settings import MONITORS, Settings, Undo, limits
 from emaviz.text.html import Html, add_html, html, said
 
 # --- ready-made faults: those of the thesis's tables, each low and high, and its multi-fault case ---------------------

@@ -10,19 +10,19 @@ import numpy as np
 import viser
 
 from ema_model.faults import FAULTS, HEALTHY, NAMES
-from ema_model.identification.next_experiment import Suggestion
 from ema_model.identification.run import ALGORITHMS, algorithm_title
 from ema_model.identification.search import POINTS, Landscape, Way
+from ema_model.identification.uncertainty import Suggestion
 from ema_model.identification.words import CORRECTED, way_sentences
 from emaviz.figures import identification
 from emaviz.figures.identification import LiveConvergence, LiveFit, Row, colour, fault_bars, table
+from emaviz.page.docked import COLUMNS, NEXT_COLUMN
 from emaviz.page.identify import WORKSPACE
-from emaviz.page.inset import COLUMNS, NEXT_COLUMN
 from emaviz.page.page import Page
 from emaviz.page.panel import JobLine
 from emaviz.page.playback import PlaybackStrip
-from emaviz.page.standing import Standing
-from emaviz.scene.motion import PLAYED, motion
+from emaviz.page.tab import Standing
+from emaviz.scene.playback import PLAYED, motion
 from emaviz.session.identify import Frame, Landscapes, Race, Track, ends
 from emaviz.session.worker import Worker
 from emaviz.text.html import Html, add_html, begin, joined, note

@@ -19,19 +19,16 @@ from emaviz.page.explore.tab import ExploreTab, take_separating
 from emaviz.page.identify import WORKSPACE
 from emaviz.page.identify.result import IdentifyResult
 from emaviz.page.page import Page
-from emaviz.page.panel import JobLine
+from emaviz.page.panel import JobLine, recording_link
 from emaviz.page.runs import RunsTab
-from emaviz.page.standing import Standing
 from emaviz.page.style import IN_PAIRS
-from emaviz.page.tab import Shared, Tab
-from emaviz.page.viewer_links import recording_link
+from emaviz.page.tab import Shared, Standing, Tab
 from emaviz.recording.viewer import ViewerHost
 from emaviz.session.compare import Comparing
-from emaviz.session.described import limits, taken
 from emaviz.session.discover.discovering import Discovering
 from emaviz.session.identify import Race
 from emaviz.session.saved import Part
-from emaviz.session.settings import SLIDERS, Settings
+from emaviz.session.settings import SLIDERS, Settings, limits, taken
 from emaviz.text.html import Html, add_html, html, joined
 
 # --- the Identify tab: what is identified, by which algorithms, and the race that one watches -------------------------

@@ -27,20 +27,18 @@ from ema_model.discovery.words import effect_title, fitted_of, value
 from ema_model.effects import CATALOGUE, find
 from ema_model.errors import InputError
 from ema_model.faults import BY_NAME, NAMES, named
-from ema_model.files.limits import CHALLENGE_RECORDING_BYTES
+from ema_model.files.opened import CHALLENGE_RECORDING_BYTES
 from ema_model.quantities.numbers import amount
 from ema_model.quantities.titles import in_sentence
 from ema_model.recordings import Measurement, read
-from ema_model.simulation.sensors import Sensors
+from ema_model.recordings.measurement import Sensors
 from ema_model.text import Document, Lines, Remark, Remarks, Severity
 from emaviz.session.compare import USUAL, Comparing
 from emaviz.session.data_folder import DataFolder, sanitised
-from emaviz.session.described import taken
 from emaviz.session.inputs import Inputs, digest, listed, version_of
-from emaviz.session.job import Job, Tell
 from emaviz.session.session import Session
-from emaviz.session.settings import Settings
-from emaviz.session.signal import Signal
+from emaviz.session.settings import Settings, taken
+from emaviz.session.worker import Job, Signal, Tell
 
 # --- what a session's file says of a discovery ------------------------------------------------------------------------
 # What a session's file says of a discovery: what it was made from, its steps, and the test that was suggested last.

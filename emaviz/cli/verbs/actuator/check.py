@@ -6,7 +6,7 @@ import argparse
 from typing import TYPE_CHECKING
 
 from ema_model.text import Document, Lines
-from emaviz.cli import files, options
+from emaviz.cli import options
 
 if TYPE_CHECKING:
     from ema_model.actuator import Actuator
@@ -20,8 +20,8 @@ PLACE = 2
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """FILE.toml, and a recording with its mapping."""
-    parser.add_argument("file", type=files.ACTUATOR, metavar="FILE.toml", help="the actuator file")
-    parser.add_argument("recording", nargs="?", type=files.RECORDING, metavar="RECORDING", help="of this actuator")
+    parser.add_argument("file", type=options.ACTUATOR, metavar="FILE.toml", help="the actuator file")
+    parser.add_argument("recording", nargs="?", type=options.RECORDING, metavar="RECORDING", help="of this actuator")
     options.add_mapping(parser)
     options.add_json(parser)
 

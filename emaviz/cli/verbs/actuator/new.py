@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 from ema_model.errors import InputError, quoted
 from ema_model.members import stated_in
 from ema_model.quantities.axes import KINDS as AXES
-from emaviz.cli import files, options
+from emaviz.cli import options
 from emaviz.cli.options import FINITE, SAMPLE_RATE
 
 if TYPE_CHECKING:
@@ -26,7 +26,7 @@ _TEXTS = ("expression", "variable", "modulator")  # of a user's effect
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """The kinds, the values that are known, effects, and how recordings are read."""
     kinds = stated_in("ema_model.actuator.keys", "KINDS")
-    parser.add_argument("file", type=files.SAVED_ACTUATOR, metavar="FILE.toml", help="the file to write")
+    parser.add_argument("file", type=options.SAVED_ACTUATOR, metavar="FILE.toml", help="the file to write")
     parser.add_argument("--name", help="what the actuator is called; without it, the file's name")
     parser.add_argument("--description", default="", help="a sentence about it")
     parser.add_argument("--motor", choices=AXES, help="whether the motor turns; rotary without it")
@@ -61,7 +61,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="what differs for recordings of such names, or PATTERN:map for static maps; repeat for more",
     )
     options.add_json(parser)
-    files.add_force(parser)
+    options.add_force(parser)
 
 
 def documents() -> tuple[type, ...]:

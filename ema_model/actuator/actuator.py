@@ -1,4 +1,4 @@
-"""One actuator: its parameters with their tolerances, its effects and its known faults."""
+"""One actuator: its parameters with tolerances, effects and faults; the steps of its models; what faults mean in it."""
 
 from __future__ import annotations
 
@@ -9,9 +9,8 @@ from fnmatch import fnmatchcase
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
-from ema_model.actuator.naming import on_axes
 from ema_model.actuator.parameters import (
     SECTIONS,
     Controller,
@@ -23,13 +22,20 @@ from ema_model.actuator.parameters import (
     Transmission,
     check_stops,
     check_value,
+    check_value_is_read,
     default_of,
+    idle,
     numbers,
+    on_axes,
+    unread,
 )
-from ema_model.actuator.unread import check_value_is_read, idle, unread
 from ema_model.errors import InputError, quoted
-from ema_model.faults import vector
+from ema_model.faults import physical, vector
 from ema_model.quantities.axes import Axes
+from ema_model.quantities.numbers import Quantity, with_uncertainty
+from ema_model.quantities.sides import USER
+
+# --- one actuator: its parameters with their tolerances, its effects and its known faults -----------------------------
 
 CURRENT_INPUTS = ("current_A", "motor_torque_Nm")  # what an open loop is driven by, the first of them that there is
 VOLTAGE_INPUTS = ("motor_voltage_V", "duty")  # the same with a voltage drive
@@ -198,3 +204,153 @@ class Actuator:
         """The rules that hold for a recording of that name, or for the file that it is a run of: NAME#3."""
         names = (name, name.rpartition("#")[0])
         return tuple(rule for rule in self.rules if any(one and fnmatchcase(one, rule.match) for one in names))
+
+
+# --- how long the model's steps and the filter of a measured motion are: by the drive, its loop and the sampling ------
+
+SHORTEST_S, LONGEST_S = 1e-7, 1.0  # that a file may say
+_STEPS_A_PERIOD = 50.0  # of the loop's own oscillation
+_LONGEST_STEP_S = 5e-4  # of a position loop: friction lets go and catches at a step
+_COARSEST_STEP_S, _COARSEST_SHARE = 1e-4, 0.05  # or of a sample's period, whichever is longer
+_SAMPLES_A_FILTER = 3.0  # to either side, over which a measured motion is differentiated at least
+
+
+def reader_step(controller: str, inverter: str) -> float:
+    """The step, s, of a file that says none.
+
+    Chopping takes steps of 10 µs; of a drive that has its current at once, only the motion is simulated.
+    """
+    return 5e-5 if inverter == "current" and controller != "unknown" else Actuator.step_s
+
+
+def usual_filter(sample_rate_Hz: float | None) -> float:
+    """Half width, s, over which a measured motion is differentiated: the reader's own, and three samples at least."""
+    least_s = float(f"{_SAMPLES_A_FILTER / sample_rate_Hz:.3g}") if sample_rate_Hz else 0.0
+    return min(max(Actuator.filter_s, least_s), LONGEST_S)
+
+
+def usual_step(actuator: Actuator, sample_rate_Hz: float | None = None) -> float:
+    """The step, s, that an actuator with a simulated loop needs.
+
+    A position loop takes fifty steps in a period of its fastest motion, and 0.5 ms at most; what the reader takes for
+    the other kinds is the most for them, and a speed loop needs fifty steps, too.  1, 2 or 5 · 10ⁿ s, 10 µs at least.
+    No step is longer than what recordings of that rate are simulated with.
+    """
+    controller, inverter = actuator.controller.kind, actuator.inverter.kind
+    is_slow = controller == "position" or actuator.takes_voltage
+    longest = _LONGEST_STEP_S if is_slow else reader_step(controller, inverter)
+    rate = loop_rate(actuator)
+    if rate > 0.0:
+        longest = min(longest, math.tau / (_STEPS_A_PERIOD * rate))
+    if sample_rate_Hz:
+        longest = min(longest, coarsest_step(1.0 / sample_rate_Hz))
+    power = 10.0 ** math.floor(math.log10(longest) + 1e-9)
+    digit = max(digit for digit in (1.0, 2.0, 5.0) if digit * power <= longest * (1.0 + 1e-9))
+    return max(Actuator.step_s, float(f"{digit * power:.0e}"))
+
+
+def coarsest_step(period_s: float) -> float:
+    """The longest step, s, that recordings with a sample every period_s are simulated with.
+
+    Where something sticks, it does so at a step: with coarser ones the error is too rough to go downhill on (fits of a
+    hobby servo, a sample every 2 ms, ended up to 300 apart in χ² with steps of 0.5 ms, within 40 with 0.1 ms).
+    """
+    return max(_COARSEST_STEP_S, _COARSEST_SHARE * period_s)
+
+
+def loop_rate(actuator: Actuator) -> float:
+    """The fastest rate of the closed loop on its inertia, 1/s; 0 where nothing is closed.
+
+    Of a cascade that of the speed loop, K_P/J.  Of a position loop the oscillation √(g τ T/J), where the gain g asks
+    for the drive's greatest torque T, or the decay (B + k_t²/R)/J with a voltage drive, whichever is faster; of a
+    voltage that is put in the decay alone.
+    """
+    motor, controller, inverter = actuator.motor, actuator.controller, actuator.inverter
+    if controller.kind == "cascade":
+        return controller.speed_gain_Nms_rad / motor.inertia_kgm2
+    if controller.kind != "position" and not actuator.takes_voltage:
+        return 0.0
+    most = float(inverter.current_limit_A) * motor.torque_constant_Nm_A
+    decay = motor.viscous_friction_Nms_rad
+    if inverter.kind == "voltage":
+        most = inverter.bus_voltage_V / motor.resistance_Ohm * motor.torque_constant_Nm_A
+        decay += motor.torque_constant_Nm_A**2 / motor.resistance_Ohm
+    stiffness = controller.gain_1_rad * actuator.transmission.gear_ratio * most * controller.output_limit
+    return max(math.sqrt(stiffness / motor.inertia_kgm2), decay / motor.inertia_kgm2)
+
+
+# --- what fault parameters mean in one actuator, as an engineer reads them --------------------------------------------
+
+
+def readings(k: ArrayLike, actuator: Actuator) -> dict[str, float]:
+    """One k as the physical values that an engineer reads, units in the names."""
+    p = physical(k)
+    return {
+        "friction_factor": float(p.friction_factor),
+        _backlash(actuator): float(p.backlash_factor * actuator.transmission.backlash_rad),
+        "turns_a": float(p.turns[0]),
+        "turns_b": float(p.turns[1]),
+        "turns_c": float(p.turns[2]),
+        "eccentricity": float(p.eccentricity),
+        "eccentricity_phase_rad": float(p.phase_rad),
+        "position_gain_1_s": float(p.gain_factor * actuator.controller.position_gain_1_s),
+    }
+
+
+def between(k: ArrayLike, interval: ArrayLike, actuator: Actuator) -> tuple[str, ...]:
+    """k (8,) and its interval (8, 2) as values in physical units, one phrase for each: 'friction × 1.60 ± 0.02'."""
+    k, ends = np.asarray(k, dtype=float), np.asarray(interval, dtype=float).T
+    p, low, high = physical(k), physical(ends[0]), physical(ends[1])
+    play = actuator.transmission.backlash_rad
+    unit = actuator.axes.unit("rad", USER)
+    half = 0.5 * play * abs(float(high.backlash_factor) - float(low.backlash_factor))
+    phrases = [
+        f"friction × {_within(p.friction_factor, low.friction_factor, high.friction_factor)}",
+        f"backlash {with_uncertainty(play * float(p.backlash_factor), half, unit)}",
+    ]
+    for phase, *values in zip("ABC", p.turns, low.turns, high.turns):
+        phrases.append(f"phase {phase}: {_within(*(100.0 * float(one) for one in values))} % of turns")
+    phrases.append(f"eccentricity ζ = {_within(p.eccentricity, low.eccentricity, high.eccentricity)}")
+    angles = [float(np.degrees(one)) for one in (p.phase_rad, low.phase_rad, high.phase_rad)]
+    phrases.append(f"thinnest gap at {_within(*angles)}°")
+    phrases.append(f"gain × {_within(p.gain_factor, low.gain_factor, high.gain_factor)}")
+    return tuple(phrases)
+
+
+def _within(value: ArrayLike, low: ArrayLike, high: ArrayLike) -> str:
+    """'1.60 ± 0.02': half the width with two digits, the value with as many decimals."""
+    at, bottom, top = (float(np.asarray(one)) for one in (value, low, high))
+    half = 0.5 * abs(top - bottom)
+    decimals = 3 if half < 5e-4 else min(3, max(0, 1 - int(np.floor(np.log10(half)))))
+    return f"{at:.{decimals}f} ± {max(half, 0.5 * 10.0**-decimals):.{decimals}f}".replace("-", "−")
+
+
+def _backlash(actuator: Actuator) -> str:
+    return actuator.axes.name("backlash_rad", USER)
+
+
+def _play(value: float, unit: str) -> str:
+    """'703 µrad', as an interval has it, in place of 0.703 mrad."""
+    shown = Quantity("", unit).scaled(value)
+    return (Quantity("", unit).scaled(1e-3 * value) if shown.factor * value < 1.0 else shown).text(value)
+
+
+def _direction(phase_rad: float) -> str:
+    """'+72', '0'."""
+    degrees = round(np.degrees(phase_rad))
+    return f"{degrees:+d}".replace("-", "−") if degrees else "0"
+
+
+def sentences(k: ArrayLike, actuator: Actuator) -> tuple[str, ...]:
+    """The same as eight short phrases, one for each k."""
+    r = readings(k, actuator)
+    return (
+        f"friction × {r['friction_factor']:.2f}",
+        f"backlash {_play(r[_backlash(actuator)], actuator.axes.unit('rad', USER))}",
+        f"phase A: {100.0 * r['turns_a']:.0f} % of turns",
+        f"phase B: {100.0 * r['turns_b']:.0f} % of turns",
+        f"phase C: {100.0 * r['turns_c']:.0f} % of turns",
+        f"eccentricity ζ = {r['eccentricity']:.2f}",
+        f"thinnest gap at {_direction(r['eccentricity_phase_rad'])}°",
+        f"gain × {physical(k).gain_factor:.2f}",
+    )

@@ -8,13 +8,19 @@ from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from typing import Any
 
-from ema_model.actuator.actuator import Actuator
+from ema_model.actuator.actuator import Actuator, loop_rate, usual_filter, usual_step
 from ema_model.actuator.file import actuator_of
-from ema_model.actuator.layout import CONTROLLER_KINDS, drives_of, layout, says_drive
-from ema_model.actuator.naming import on_axes
-from ema_model.actuator.parameters import SECTIONS, default_of, facts_of
-from ema_model.actuator.steps import loop_rate, usual_filter, usual_step
-from ema_model.actuator.unread import unread
+from ema_model.actuator.parameters import (
+    CONTROLLER_KINDS,
+    SECTIONS,
+    default_of,
+    drives_of,
+    facts_of,
+    layout,
+    on_axes,
+    says_drive,
+    unread,
+)
 from ema_model.errors import InputError, quoted
 from ema_model.quantities.axes import Axes
 from ema_model.quantities.numbers import number

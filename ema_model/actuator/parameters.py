@@ -1,15 +1,20 @@
-"""An actuator's parameters and their tolerances."""
+"""An actuator's parameters: their names on its axes, which of them it has, and which no model of its kind reads."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Collection, Iterable
 from dataclasses import MISSING, dataclass, field, fields, replace
 from typing import Any
 
+from ema_model.actuator import keys
 from ema_model.errors import InputError, quoted
 from ema_model.quantities.axes import Axes
 from ema_model.quantities.numbers import as_number
 from ema_model.quantities.sides import MOTOR, USER, Side
+from ema_model.quantities.titles import in_sentence, parameter_title, unit_of
+
+# --- an actuator's parameters and their tolerances --------------------------------------------------------------------
 
 Sits = dict[str, Side]
 _FAR = 1e9  # rad, where an end stop is out of reach
@@ -301,3 +306,249 @@ def check_stops(transmission: Transmission, axes: Axes, where: str) -> None:
     if not transmission.stop_low_rad < transmission.stop_high_rad:
         low, high = (axes.name(name, USER) for name in ("stop_low_rad", "stop_high_rad"))
         raise InputError(f"{where}: [transmission] {low} must be below {high}")
+
+
+# --- what parameters are called and measured in on an actuator's axes: the owner of each says where it sits -----------
+
+# Where the windows of recordings start ("play 0"), and what load a recording bears.
+_OF_WINDOWS: dict[str, tuple[str, Side | None]] = {
+    "turned": ("rad", MOTOR),
+    "play": ("rad", MOTOR),
+    "faster": ("rad/s", MOTOR),
+    "load": ("N·m", USER),
+    "lag": ("s", None),
+}
+
+
+@dataclass(frozen=True)
+class Named:
+    """A parameter as files and people have it."""
+
+    path: str  # "motor.mass_kg"
+    title: str  # "Motor mass"
+    unit: str  # "kg"
+
+    @property
+    def name(self) -> str:
+        """The last part of its path, as it stands in its section."""
+        return self.path.rpartition(".")[2]
+
+
+def on_axes(path: str, axes: Axes) -> Named:
+    """How "section.parameter", "effects.name.parameter" or the start of a window is shown on these axes.
+
+    What is none of these, as k1, stays as it is.
+    """
+    section, _, name = path.partition(".")
+    if section == "effects":
+        return _of_effect(path, axes)
+    known = {one.name: one for one in fields(SECTIONS[section])} if section in SECTIONS else {}
+    if name in known:
+        side, per = (known[name].metadata.get(key) for key in ("side", "per"))
+        shown = f"{section}.{axes.name(name, side)}"
+        return Named(shown, parameter_title(shown), axes.unit(unit_of(name), side, per))
+    kind, window, _ = path.partition(" ")
+    unit, side = _OF_WINDOWS.get(kind, ("", None)) if window else ("", None)
+    return Named(path, parameter_title(path), axes.unit(unit, side))
+
+
+def path_inside(path: str, among: Iterable[str], axes: Axes) -> str:
+    """The path inside of one that files and people have, among these; what is none of them stays."""
+    return next((one for one in among if on_axes(one, axes).path == path), path)
+
+
+def _of_effect(path: str, axes: Axes) -> Named:
+    from ema_model.effects import find  # the catalogue need not be loaded for an actuator without effects
+
+    section, effect, name = path.split(".")
+    try:
+        found = find(effect, axes)
+        parameter = next(one for one in found.parameters if one.name == name)
+    except (InputError, StopIteration):  # of a user, and not known here
+        return Named(path, f"{effect}: {in_sentence(parameter_title(name))}", unit_of(name))
+    title = f"{found.title}: {in_sentence(parameter.title)}"
+    return Named(f"{section}.{effect}.{parameter.shown}", title, parameter.unit)
+
+
+# --- what an actuator's file may not say, because no model of its kind would read it: refused with the reason ---------
+# A number that nothing reads would look as if it had been taken into account.  At its neutral value, which is its
+# default, it says nothing and may stand.
+
+_CONTROLLERS = {
+    "cascade": {
+        "gain_1_rad output_limit": "a cascade's gains are of speed, its limit is current_limit_A",
+    },
+    "position": {
+        "speed_limit_rad_s speed_gain_Nms_rad integral_gain_Nm_rad derivative_gain_Nms2_rad integrator_window_rad "
+        "torque_constant_Nm_A": "a position controller has no speed loop",
+        "position_gain_1_s": "a position controller's gain is gain_1_rad",
+        "current_limit_A": "a position controller's limit is output_limit",
+    },
+    "open": {
+        " ".join(f.name for f in fields(SECTIONS["controller"])): "an open loop has no controller",
+    },
+    "unknown": {
+        " ".join(f.name for f in fields(SECTIONS["controller"])): "a controller that is not known has no parameters",
+    },
+}
+NO_WINDING = "an ideal current source has no winding"
+_DRIVES = {
+    "hysteresis": {
+        "inverter": {"current_limit_A": "a hysteresis inverter's limit is [controller] current_limit_A"},
+    },
+    "current": {
+        "inverter": {"bus_voltage_V hysteresis_band_A": "an ideal current source has no voltage and no relays"},
+        "motor": {"resistance_Ohm inductance_H emf_scale": NO_WINDING},
+    },
+    "voltage": {
+        "inverter": {
+            "hysteresis_band_A": "a voltage drive has no relays",
+            "current_limit_A": "a voltage drive does not limit its current",
+        },
+        "motor": {"emf_scale": "with a voltage drive the EMF's constant is the torque constant"},
+    },
+}
+INVERSE = "the controller is unknown, and inverse dynamics"
+_CURRENT_IN = "the recorded current or torque is put in as it is"
+_LOOP = {"apparent_inertia": "it is of inverse dynamics, for an unknown controller"}
+_VOLTAGE_IN = "the recorded voltage or duty is put in, and nothing is controlled"
+_OF_SENSORS = {"unknown": {}, "open": {"current_gain current_bias_A": _CURRENT_IN, **_LOOP}}
+# Instead of the drive's, where a measured motion is put in and the current that it needs comes out.
+_MOTION_IN = {
+    "inverter": {"bus_voltage_V hysteresis_band_A current_limit_A": f"{INVERSE} has no drive"},
+    "motor": {
+        "resistance_Ohm inductance_H emf_scale": f"{INVERSE} has no winding",
+        "rotor_offset_rad": f"{INVERSE} has no phases",
+        "torque_limit_Nm": f"{INVERSE} asks for what a motion needs, without a limit",
+    },
+    "transmission": {
+        "backlash_rad": f"{INVERSE} does not follow the play",
+        "stop_low_rad stop_high_rad": f"{INVERSE} takes the motion as measured",
+    },
+}
+# The places of effects (`PLACES`) that inverse dynamics has, and those that a winding alone has.
+INVERSE_PLACES = ("current_reading", "electric_torque", "inverse_inertia", "moving_friction", "shaft_torque")
+WINDING_PLACES = ("back_emf", "bus_voltage", "winding_resistance")
+# Those of the drive's controller that a position controller has not, and that a voltage drive has not.
+SPEED_LOOP_PLACES = ("speed_reading", "speed_sample", "speed_command", "speed_gain", "integral_gain", "loop_torque")
+# The command, which an open loop has none of; what is only remembered of it there changes nothing.
+GOAL_PLACES = ("goal", "position_error")
+CURRENT_LOOP_PLACES = ("current_reference",)
+# All stages of a drive, and what the reading of a current changes, where the current is put in.
+CURRENT_IN_PLACES = (*GOAL_PLACES, *SPEED_LOOP_PLACES, "drive_output", *CURRENT_LOOP_PLACES, "current_reading")
+# The same where a voltage is put in: what the drive computes may take effect late, and the current is measured.
+VOLTAGE_IN_PLACES = (*GOAL_PLACES, *SPEED_LOOP_PLACES, *CURRENT_LOOP_PLACES)
+
+
+def idle(places: Collection[str], has_states: bool, controller: str, inverter: str) -> str:
+    """Why an effect with these places does nothing to an actuator of these kinds; "" where it may act."""
+    at = set(places)
+    if controller == "unknown" and (has_states or not at & set(INVERSE_PLACES)):
+        return f"{INVERSE} does not simulate what it acts on"
+    if controller == "open" and inverter != "voltage" and at <= set(CURRENT_IN_PLACES):
+        return f"in an open loop {_CURRENT_IN}"
+    if controller == "open" and at <= set(VOLTAGE_IN_PLACES):
+        return f"in an open loop {_VOLTAGE_IN}"
+    if inverter == "current" and at <= set(WINDING_PLACES):
+        return f"{NO_WINDING} for it to act on"
+    if controller == "position" and at & set(SPEED_LOOP_PLACES) and at <= {"goal", *SPEED_LOOP_PLACES}:
+        return "a position controller has no speed loop for it to act on"
+    if inverter == "voltage" and at <= set(CURRENT_LOOP_PLACES):
+        return "a voltage drive has no current loop for it to act on"
+    return ""
+
+
+def unread(controller: str, inverter: str) -> dict[str, str]:
+    """Why no model reads it, by "section.parameter", for an actuator of these kinds."""
+    drive = _MOTION_IN if controller == "unknown" else _DRIVES[inverter]
+    sensors = _LOOP if inverter == "voltage" and controller == "open" else _OF_SENSORS.get(controller, _LOOP)
+    by_section = {**drive, "sensors": sensors, "controller": _CONTROLLERS[controller]}
+    return {
+        f"{section}.{name}": reason
+        for section, reasons in by_section.items()
+        for names, reason in reasons.items()
+        for name in names.split()
+        if name != "kind"
+    }
+
+
+def settings_read(controller: str) -> tuple[str, ...]:
+    """The keys of [model] that a model of this kind of controller reads."""
+    return (
+        ("filter_s", "leaves_out_reversals", "torque_known") if controller == "unknown" else ("step_s", "torque_known")
+    )
+
+
+def check_value_is_read(controller: str, inverter: str, axes: Axes, path: str, value: float, where: str) -> None:
+    """Raises InputError with the reason for a value, other than the neutral one, that no model would read."""
+    section, _, name = path.partition(".")
+    reason = unread(controller, inverter).get(path)
+    neutral = getattr(SECTIONS[section], name, None)  # a dataclass keeps its defaults on the class
+    if reason is not None and value != neutral:
+        raise InputError(f"{where}: {on_axes(path, axes).path}: {reason}; leave it out")
+
+
+# --- which parameters an actuator file has, by the kind of its controller and drive -----------------------------------
+
+CONTROLLER_KINDS, INVERTER_KINDS = tuple(keys.KINDS["controller"]), tuple(keys.KINDS["inverter"])
+KINDS = {"controller": CONTROLLER_KINDS, "inverter": INVERTER_KINDS}
+USUAL = {"controller": "cascade", "inverter": "hysteresis"}
+
+WITHOUT_LOOP = ("open", "unknown")  # controllers that close none: no command can be simulated
+
+_CASCADE = (
+    *("position_gain_1_s", "speed_limit_rad_s", "speed_gain_Nms_rad", "integral_gain_Nm_rad"),
+    *("derivative_gain_Nms2_rad", "integrator_window_rad", "torque_constant_Nm_A", "current_limit_A"),
+)
+_MOTION = (
+    *("torque_constant_Nm_A", "inertia_kgm2", "viscous_friction_Nms_rad", "static_friction_Nm", "dynamic_friction_Nm"),
+)
+_DRIVES_WITH = {
+    "hysteresis": ("bus_voltage_V", "hysteresis_band_A"),
+    "current": ("current_limit_A",),
+    "voltage": ("bus_voltage_V",),
+}
+_OF_CONTROLLER = {  # the drives that each controller may act through, the usual one first
+    "cascade": ("current", "hysteresis"),
+    "position": ("voltage", "current"),
+    "open": ("current", "voltage"),  # in which the recorded current is put in, or the voltage or duty
+    "unknown": ("current",),
+}
+
+
+def drives_of(controller: str) -> tuple[str, ...]:
+    """The drives that a controller may act through, the usual one first."""
+    return _OF_CONTROLLER[controller]
+
+
+def says_drive(controller: str, drive: str) -> bool:
+    """Whether a file of these kinds says its drive: one whose current is the recorded one has none to speak of."""
+    return controller not in WITHOUT_LOOP or (controller, drive) == ("open", "voltage")
+
+
+def layout(section: str, kinds: dict[str, str]) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    """Names that a section must have, and those that it may have besides.
+
+    kinds: the actuator's "controller" and "inverter".  Only an actuator of the thesis's kind must say all.
+    """
+    controller, inverter = kinds["controller"], kinds["inverter"]
+    full = controller == "cascade" and inverter == "hysteresis"
+    every = numbers(section)
+    if section == "controller":
+        needed = {"cascade": _CASCADE, "position": ("gain_1_rad",), "open": (), "unknown": ()}[controller]
+        return needed, ("output_limit",) if controller == "position" else ()
+    if section == "inverter":
+        needed = _DRIVES_WITH[inverter]
+        return ((), needed) if controller in WITHOUT_LOOP else (needed, ())
+    if full:
+        needed = tuple(name for name in every if f"{section}.{name}" not in unread(controller, inverter))
+        return needed, tuple(name for name in every if name not in needed)
+    needed = _MOTION if section == "motor" else ()
+    if section == "motor" and inverter == "voltage" and controller != "unknown":
+        needed = ("resistance_Ohm", *needed)
+    return needed, tuple(name for name in every if name not in needed)
+
+
+def paths() -> tuple[str, ...]:
+    """Every "section.parameter" of an actuator with a cascade and a hysteresis current loop."""
+    return tuple(f"{section}.{name}" for section in SECTIONS for name in layout(section, USUAL)[0])

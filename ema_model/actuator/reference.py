@@ -10,10 +10,23 @@ from typing import TYPE_CHECKING, Any
 
 from ema_model.actuator import keys
 from ema_model.actuator.actuator import Actuator
-from ema_model.actuator.layout import CONTROLLER_KINDS, INVERTER_KINDS, KINDS, drives_of, layout, says_drive
-from ema_model.actuator.naming import on_axes
-from ema_model.actuator.parameters import SECTIONS, Facts, default_of, facts_of, is_said, numbers
-from ema_model.actuator.unread import settings_read, unread
+from ema_model.actuator.parameters import (
+    CONTROLLER_KINDS,
+    INVERTER_KINDS,
+    KINDS,
+    SECTIONS,
+    Facts,
+    default_of,
+    drives_of,
+    facts_of,
+    is_said,
+    layout,
+    numbers,
+    on_axes,
+    says_drive,
+    settings_read,
+    unread,
+)
 from ema_model.files.written import inline
 from ema_model.quantities.axes import Axes
 from ema_model.quantities.numbers import number

@@ -12,9 +12,7 @@ import tomlkit
 
 from ema_model.actuator import keys
 from ema_model.actuator.actuator import Actuator
-from ema_model.actuator.layout import layout
-from ema_model.actuator.naming import on_axes
-from ema_model.actuator.parameters import SECTIONS, default_of, facts_of, numbers
+from ema_model.actuator.parameters import SECTIONS, default_of, facts_of, layout, numbers, on_axes
 from ema_model.actuator.reference import as_spelt, tables_of
 from ema_model.errors import InputError, quoted
 from ema_model.files.opened import TEXT_BYTES

@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ema_model.actuator import Actuator, load_actuator
-from ema_model.actuator.all_is_read import check_represents
-from ema_model.actuator.naming import path_inside
+from ema_model.actuator.file import check_represents
+from ema_model.actuator.parameters import path_inside
 from ema_model.comparison.free_simulation import Simulated, in_open_loop, is_by_motion, scored
 from ema_model.comparison.loop_lag import other_controller
 from ema_model.comparison.residuals import residuals_of
@@ -24,9 +24,7 @@ from ema_model.estimation.floor import band, least, spread, tells_nothing, twin_
 from ema_model.estimation.problem import SIGNALS
 from ema_model.faults import checked, named
 from ema_model.models import Model, Window, model_for
-from ema_model.models.delay_of_drive import with_delay_of_drive
-from ema_model.models.later import later
-from ema_model.models.measured_motion import evaluation_stretches, fit_stretches
+from ema_model.models.measured_motion import evaluation_stretches, fit_stretches, later, with_delay_of_drive
 from ema_model.quantities.numbers import check_number
 from ema_model.recordings import SIGNALS as SIGNAL_KINDS
 from ema_model.recordings import Measurement

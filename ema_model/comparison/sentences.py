@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from ema_model.quantities.axes import Axes
+from ema_model.quantities.axes import Axes, of_residual
 from ema_model.quantities.numbers import Quantity, number
-from ema_model.quantities.shown import of_residual
 from ema_model.quantities.titles import in_sentence
 from ema_model.quantities.variables import MODULATORS, VARIABLES, is_turn, of_variable
 from ema_model.recordings import SIGNALS

@@ -8,14 +8,13 @@ from typing import Annotated, TypedDict, TypeVar, cast
 import numpy as np
 from msgspec import Meta
 
-from ema_model.actuator.naming import on_axes
+from ema_model.actuator.parameters import on_axes
 from ema_model.comparison.events import Event
 from ema_model.comparison.free_simulation import Simulated, without
 from ema_model.comparison.result import COMPARISON_VERDICTS, Compared, Comparison, Region, SignalError
 from ema_model.estimation import Calibrated, Calibration
-from ema_model.quantities.axes import Axes
+from ema_model.quantities.axes import SIGNALS, Axes
 from ema_model.quantities.numbers import IntervalJson
-from ema_model.quantities.signals import SIGNALS
 from ema_model.recordings.health import HealthJson
 
 _Value = TypeVar("_Value")

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ema_model.actuator import Actuator
-from ema_model.actuator.naming import on_axes
+from ema_model.actuator.parameters import on_axes
 from ema_model.comparison.criteria import BEYOND, SLOW
 from ema_model.comparison.events import Event, events
 from ema_model.comparison.explain import Explanation, Order, explain, residual_orders, used_blocks
@@ -19,8 +19,8 @@ from ema_model.comparison.result import Compared, Region, SignalError
 from ema_model.comparison.sentences import OPEN_LOOP, order_sentence
 from ema_model.estimation import Calibration
 from ema_model.estimation.floor import CONSTANT, CORRELATED_S, ORDER_OF_PRIMARY, POSITIONS, SPEED
+from ema_model.quantities.axes import of_residual, of_signal
 from ema_model.quantities.numbers import Quantity
-from ema_model.quantities.shown import of_residual, of_signal
 from ema_model.quantities.titles import in_sentence
 from ema_model.recordings import SIGNALS
 

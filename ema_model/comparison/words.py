@@ -11,9 +11,8 @@ from ema_model.comparison.free_simulation import Score, Simulated, without
 from ema_model.comparison.result import Compared, Comparison, Region, SignalError
 from ema_model.comparison.sentences import dependence
 from ema_model.estimation.calibrate import calibration_table
-from ema_model.quantities.axes import ROTARY, Axes
+from ema_model.quantities.axes import ROTARY, Axes, of_residual, of_signal
 from ema_model.quantities.numbers import Quantity, number
-from ema_model.quantities.shown import of_residual, of_signal
 from ema_model.quantities.titles import in_sentence
 from ema_model.quantities.variables import of_variable
 from ema_model.recordings.noise import least_noise

@@ -13,8 +13,8 @@ from msgspec import Meta
 from numpy.typing import NDArray
 
 from ema_model.actuator import Actuator
-from ema_model.actuator.naming import on_axes
-from ema_model.actuator.readings import sentences as phrases_of
+from ema_model.actuator.actuator import sentences as phrases_of
+from ema_model.actuator.parameters import on_axes
 from ema_model.comparison.criteria import BAND
 from ema_model.comparison.loop_lag import BLAMED, LoopLag
 from ema_model.comparison.sentences import dependence
@@ -40,9 +40,8 @@ from ema_model.effects.effect import FAMILIES
 from ema_model.errors import InputError
 from ema_model.estimation import Calibrated
 from ema_model.faults import BY_NAME, FAULTS, NAMES, cause_of, causes, vector
-from ema_model.quantities.axes import Axes
+from ema_model.quantities.axes import Axes, of_signal
 from ema_model.quantities.numbers import IntervalJson, Quantity, amount, number, with_uncertainty
-from ema_model.quantities.shown import of_signal
 from ema_model.quantities.sides import USER
 from ema_model.quantities.titles import all_of, in_sentence
 from ema_model.simulation.run import run_in_words

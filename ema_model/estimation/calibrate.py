@@ -10,13 +10,13 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ema_model.actuator import Actuator
-from ema_model.actuator.naming import on_axes
+from ema_model.actuator.parameters import on_axes
 from ema_model.estimation.floor import CORRELATED_S, Floor, local_rms
 from ema_model.estimation.least_squares import descended
-from ema_model.estimation.problem import Problem
-from ema_model.estimation.unknowns import (
+from ema_model.estimation.problem import (
     ECCENTRICITY,
     K_SIGMA,
+    Problem,
     Unknown,
     physical_limits,
     polar,

@@ -13,8 +13,17 @@ from scipy.ndimage import uniform_filter1d
 
 from ema_model.estimation.floor import CORRELATED_S, Floor, floor
 from ema_model.estimation.least_squares import Descent
-from ema_model.estimation.problem import DIVERGED, TOGETHER, Problem
-from ema_model.estimation.unknowns import K_SIGMA, Unknown, lags_of, loads_of, starts_of, unknowns_of
+from ema_model.estimation.problem import (
+    DIVERGED,
+    K_SIGMA,
+    TOGETHER,
+    Problem,
+    Unknown,
+    lags_of,
+    loads_of,
+    starts_of,
+    unknowns_of,
+)
 from ema_model.faults import HEALTHY, NAMES
 from ema_model.models import ClosedLoop
 from ema_model.models.closed_loop import LOAD

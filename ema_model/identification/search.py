@@ -12,8 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from ema_model.actuator import Actuator
 from ema_model.errors import InputError, quoted
 from ema_model.estimation.least_squares import Descent
-from ema_model.estimation.problem import Problem
-from ema_model.estimation.unknowns import K_SIGMA
+from ema_model.estimation.problem import K_SIGMA, Problem
 from ema_model.faults import HEALTHY, NAMES
 from ema_model.identification.fit import Fitted
 from ema_model.models.closed_loop import ClosedLoop

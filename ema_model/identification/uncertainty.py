@@ -11,13 +11,12 @@ from numpy.typing import NDArray
 from scipy.special import chdtri, i0e, stdtrit
 
 from ema_model import faults
-from ema_model.actuator.naming import on_axes
+from ema_model.actuator.parameters import on_axes
 from ema_model.commands import command
 from ema_model.errors import InputError
 from ema_model.estimation.calibrate import driven_to_bound
 from ema_model.estimation.floor import CORRELATED_S, Floor, repeats_of, silent
-from ema_model.estimation.problem import Problem
-from ema_model.estimation.unknowns import ECCENTRICITY, K_SIGMA, polar, to_vector
+from ema_model.estimation.problem import ECCENTRICITY, K_SIGMA, Problem, polar, to_vector
 from ema_model.identification.fit import FAULTS, TWINS, Fitted
 from ema_model.identification.search import logged_apart
 from ema_model.models import ClosedLoop

@@ -11,8 +11,8 @@ from msgspec import Meta
 
 from ema_model import faults
 from ema_model.actuator import Actuator
-from ema_model.actuator.naming import on_axes
-from ema_model.actuator.readings import between, readings, sentences
+from ema_model.actuator.actuator import between, readings, sentences
+from ema_model.actuator.parameters import on_axes
 from ema_model.identification.run import Identification, Progress, algorithm_title
 from ema_model.identification.search import Landscape, Way
 from ema_model.quantities.numbers import IntervalJson, amount

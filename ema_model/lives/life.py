@@ -15,7 +15,7 @@ from ema_model import faults
 from ema_model.actuator import Actuator, load_actuator
 from ema_model.commands import command
 from ema_model.errors import InputError, quoted
-from ema_model.estimation.unknowns import ECCENTRICITY, to_vector
+from ema_model.estimation.problem import ECCENTRICITY, to_vector
 from ema_model.files.opened import shipped_folder
 from ema_model.identification.fit import refine, setting
 from ema_model.identification.search import Objective

@@ -19,9 +19,8 @@ from ema_model.commands import Recorded
 from ema_model.commands.recorded import jumps
 from ema_model.effects import find
 from ema_model.errors import InputError
-from ema_model.models.later import later
 from ema_model.models.loop_window import BLOCK_S, COMPARED, LoopWindow, cut
-from ema_model.models.measured_motion import check_steps, on_even_grid
+from ema_model.models.measured_motion import check_steps, later, on_even_grid
 from ema_model.models.model import Effects, Signals
 from ema_model.physics.rows import LANES
 from ema_model.recordings import Measurement

@@ -15,8 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 from ema_model.actuator import Actuator
 from ema_model.effects import find
 from ema_model.errors import InputError
-from ema_model.models.later import later
-from ema_model.models.measured_motion import Stretch, on_even_grid, stretches_of
+from ema_model.models.measured_motion import Stretch, later, on_even_grid, stretches_of
 from ema_model.models.model import Effects, Signals
 from ema_model.physics.rows import LANES
 from ema_model.recordings import Measurement

@@ -8,8 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ema_model.actuator import Actuator
-from ema_model.actuator.actuator import CURRENT_INPUTS, VOLTAGE_INPUTS
-from ema_model.actuator.steps import coarsest_step
+from ema_model.actuator.actuator import CURRENT_INPUTS, VOLTAGE_INPUTS, coarsest_step
 from ema_model.commands.recorded import between
 from ema_model.errors import InputError, quoted
 from ema_model.models.model import Window

@@ -1,21 +1,64 @@
-"""Measured motion: sampling, stretches, derivatives."""
+"""The measured motion as the models take it: even, filtered, later; and a drive that answers late."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import maximum_filter1d, median_filter, uniform_filter1d
 
-from ema_model.actuator import Actuator
+from ema_model.actuator import Actuator, Tolerance
 from ema_model.errors import InputError, quoted
 from ema_model.models.loop_window import BLOCK_S, CONTEXT
 from ema_model.models.model import Window
 from ema_model.recordings import Measurement
 from ema_model.recordings.noise import NEAR, WITHIN, sample_noise
 from ema_model.simulation.run import FASTEST_HZ, SLOWEST_HZ, steps_per_sample
+
+# --- signals a little later than they are, by Taylor's series about each sample ---------------------------------------
+
+Array = NDArray[np.float64]
+
+
+def later(values: Array, late_s: Array, period_s: float, *, smooth: bool = False) -> Array:
+    """Signals (n, samples) so much later, (n, 1): to the first order; of smooth ones to the second."""
+    if not np.any(late_s):
+        return values
+    with np.errstate(invalid="ignore", over="ignore"):  # of one that diverges
+        slope = np.gradient(values, period_s, axis=1)
+        shifted = values - late_s * slope
+        return shifted + 0.5 * late_s**2 * np.gradient(slope, period_s, axis=1) if smooth else shifted
+
+
+# --- a digital drive answers late: by how much no actuator's file says, so that every comparison looks for it ---------
+
+_DELAY = "computation_delay"
+_SERVO_SAMPLE_S = 2e-3  # of a usual position servo
+
+
+def with_delay_of_drive(actuator: Actuator, measurements: Sequence[Measurement]) -> Actuator:
+    """The actuator with a computation delay of 0 that a calibration may move.
+
+    1 σ is about a sample of the recordings, of a position servo no less than its own, however fast it is logged.
+
+    Without it, what the loop loses of its damping is taken for a torque constant or a current sensor that is off.
+    As it is where its drive is the three-phase model's, which is not a digital one, or where no drive is simulated.
+    """
+    is_simulated = actuator.controller.kind in ("cascade", "position") or actuator.takes_voltage
+    if not is_simulated or actuator.has_reference_model:
+        return actuator
+    if _DELAY in actuator.effects or not any(one.free for one in actuator.tolerances.values()):
+        return actuator
+    own = _SERVO_SAMPLE_S if actuator.controller.kind == "position" else 0.0
+    late = Tolerance(max(own, *(one.sample_period_s for one in measurements)), True)
+    return replace(
+        actuator,
+        effects={**actuator.effects, _DELAY: {"delay_s": 0.0}},
+        tolerances={**actuator.tolerances, f"effects.{_DELAY}.delay_s": late},
+    )
+
 
 # --- what of a recording's sampling a model can follow ----------------------------------------------------------------
 # What of a recording's sampling a model can follow: checked before anything is laid out in steps of the model.
@@ -127,8 +170,6 @@ def _of(measurement: Measurement, share: float, parts: int, actuator: Actuator) 
 # Local parabolas (Savitzky–Golay) give the acceleration; what smoothing that implies is known exactly: the
 # acceleration of a motion filtered by h, where h is the twice summed kernel of the second difference. All that is
 # held against the acceleration passes the same h, so that a comparison is free of the filter's own error.
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from ema_model.quantities.signals import SIGNALS, Signal
+from ema_model.quantities.axes import SIGNALS, Signal
 from ema_model.recordings.columns import (
     ColumnMapping,
     MappedColumn,

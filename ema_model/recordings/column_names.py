@@ -8,7 +8,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass, replace
 
 from ema_model.files.opened import shown
-from ema_model.quantities.signals import SIGNALS
+from ema_model.quantities.axes import SIGNALS
 from ema_model.quantities.titles import in_sentence
 from ema_model.quantities.units import UNITS, find_unit
 

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ema_model.errors import InputError, did_you_mean
 from ema_model.files.opened import listed, shown
-from ema_model.quantities.signals import SIGNALS
+from ema_model.quantities.axes import SIGNALS
 from ema_model.quantities.units import Unit, dimensions_of, find_unit, known_units
 from ema_model.recordings.column_names import Context, Guess, guesses, readings
 from ema_model.recordings.exports import known_export

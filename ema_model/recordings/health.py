@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 
 from ema_model.actuator import Actuator
 from ema_model.files.opened import listed, shown
+from ema_model.quantities.axes import SIGNALS
 from ema_model.quantities.numbers import amount
-from ema_model.quantities.signals import SIGNALS
 from ema_model.quantities.titles import in_sentence
 from ema_model.recordings import noise as noise_recordings
 from ema_model.recordings.columns import MappedColumn

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ema_model.actuator import Actuator
-from ema_model.actuator.layout import WITHOUT_LOOP
+from ema_model.actuator.parameters import WITHOUT_LOOP
 from ema_model.commands import Command
 from ema_model.errors import InputError, quoted
 from ema_model.recordings import Measurement

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ema_model.actuator import Actuator
-from ema_model.actuator.layout import WITHOUT_LOOP
+from ema_model.actuator.parameters import WITHOUT_LOOP
 from ema_model.commands import command
 from ema_model.effects import Effect, find
 from ema_model.errors import InputError

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from ema_model import faults
 from ema_model.errors import InputError, did_you_mean, quoted
-from ema_model.estimation.unknowns import ECCENTRICITY
+from ema_model.estimation.problem import ECCENTRICITY
 from ema_model.quantities.numbers import HALF_90, check_number
 from ema_model.tracking.evidence import LEAST_FLIGHTS, LONGEST, MISFIT_SHARE, MISFIT_WINDOW, WORN_BEFORE
 from ema_model.tracking.flights import Flight

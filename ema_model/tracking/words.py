@@ -6,7 +6,7 @@ from collections import Counter
 from itertools import combinations
 
 from ema_model import faults
-from ema_model.estimation.unknowns import ECCENTRICITY
+from ema_model.estimation.problem import ECCENTRICITY
 from ema_model.quantities.numbers import number
 from ema_model.quantities.titles import in_sentence
 from ema_model.text import Document, Lines, Note, Table

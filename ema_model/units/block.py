@@ -13,8 +13,7 @@ from ema_model.discovery.evidence.counted import colour
 from ema_model.estimation import Floor, calibrate, default_free, floor
 from ema_model.estimation.floor import POSITIONS
 from ema_model.estimation.model_fit import Data
-from ema_model.estimation.problem import SIGNALS, Problem
-from ema_model.estimation.unknowns import starts_of, unknowns_of
+from ema_model.estimation.problem import SIGNALS, Problem, starts_of, unknowns_of
 from ema_model.identification.fit import TWINS, Twins, twins
 from ema_model.models import Model, model_for
 from ema_model.models.measured_motion import fit_stretches

@@ -9,8 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ema_model.actuator import Actuator
-from ema_model.actuator.naming import on_axes, path_inside
-from ema_model.actuator.parameters import low_limit
+from ema_model.actuator.parameters import low_limit, on_axes, path_inside
 from ema_model.errors import InputError, quoted
 from ema_model.estimation import default_free
 from ema_model.estimation.problem import SIGNALS

@@ -9,7 +9,7 @@ from typing import Annotated, TypedDict
 from msgspec import Meta
 
 from ema_model.actuator import Actuator
-from ema_model.actuator.naming import on_axes
+from ema_model.actuator.parameters import on_axes
 from ema_model.comparison.summary import ParameterJson, parameter_dict
 from ema_model.discovery import Added, Discovery, discover
 from ema_model.discovery import as_dict as of_discovery

@@ -11,9 +11,9 @@ from msgspec import Meta
 from numpy.typing import NDArray
 
 from ema_model.actuator import Actuator
-from ema_model.actuator.naming import on_axes
+from ema_model.actuator.parameters import on_axes
+from ema_model.quantities.axes import of_signal
 from ema_model.quantities.numbers import HALF_90, IntervalJson, amount, number, with_uncertainty
-from ema_model.quantities.shown import of_signal
 from ema_model.quantities.titles import in_sentence
 from ema_model.text import Block, Document, InWords, Lines, Note, Table
 from ema_model.units.criteria import MISFIT

@@ -9,12 +9,11 @@ from typing import NamedTuple
 import numpy as np
 import plotly.graph_objects as go
 
-from ema_model.actuator.naming import on_axes
+from ema_model.actuator.parameters import on_axes
 from ema_model.comparison.result import Comparison, Region
 from ema_model.faults import NAMES
-from ema_model.quantities.axes import ROTARY, Axes
+from ema_model.quantities.axes import ROTARY, Axes, of_signal
 from ema_model.quantities.numbers import number
-from ema_model.quantities.shown import of_signal
 from ema_model.recordings import Measurement
 from emaviz.colours import ALGORITHMS, CASES, REFERENCE_SHADES
 from emaviz.figures import theme

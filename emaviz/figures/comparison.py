@@ -10,10 +10,10 @@ from plotly.subplots import make_subplots
 from ema_model.comparison.result import Comparison, Region
 from ema_model.errors import InputError
 from ema_model.estimation.floor import BAND_SIGMAS
-from ema_model.quantities import shown, variables
-from ema_model.quantities.axes import ROTARY, Axes
+from ema_model.quantities import axes as axes_quantities
+from ema_model.quantities import variables
+from ema_model.quantities.axes import ROTARY, Axes, of_signal
 from ema_model.quantities.numbers import Quantity
-from ema_model.quantities.shown import of_signal
 from ema_model.quantities.variables import MODULATORS, variable_title
 from ema_model.recordings import SIGNALS, ColumnMapping, Measurement, apply_mapping
 from emaviz.colours import BACKWARD, COMMAND, DIFFERENCE, FORWARD, MONITOR, REFERENCE
@@ -658,13 +658,13 @@ def model_pair(
 
 def quantity_of_signal(comparison: Comparison, name: str) -> Quantity:
     """A signal, in its own unit."""
-    return shown.of_signal(name, comparison.actuator.axes)
+    return axes_quantities.of_signal(name, comparison.actuator.axes)
 
 
 def of_residual(comparison: Comparison, name: str, *, as_torque: bool = False) -> Quantity:
     """What is left of a signal; as_torque: the current's is told as the motor's torque, where that is known."""
     constant = comparison.residuals.torque_constant if as_torque else None
-    return shown.of_residual(name, comparison.actuator.axes, constant)
+    return axes_quantities.of_residual(name, comparison.actuator.axes, constant)
 
 
 def of_variable(comparison: Comparison, variable: str) -> Quantity:

@@ -12,7 +12,7 @@ import viser
 from numpy.typing import ArrayLike, NDArray
 
 from ema_model.actuator import Actuator
-from ema_model.actuator.readings import between, sentences
+from ema_model.actuator.actuator import between, sentences
 from ema_model.faults import FAULTS, HEALTHY, NAMES
 from ema_model.identification.run import ROBUST, algorithm_title
 from ema_model.identification.search import Landscape, Objective

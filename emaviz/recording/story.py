@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ema_model import faults
-from ema_model.actuator.readings import between, sentences
+from ema_model.actuator.actuator import between, sentences
 from ema_model.commands import Recorded
 from ema_model.identification.run import Identification, Progress, algorithm_title
 from ema_model.identification.search import Objective

@@ -10,8 +10,8 @@ from typing import Any
 import plotly.graph_objects as go
 
 from ema_model import faults
-from ema_model.actuator.naming import on_axes
-from ema_model.actuator.readings import readings, sentences
+from ema_model.actuator.actuator import readings, sentences
+from ema_model.actuator.parameters import on_axes
 from ema_model.identification.run import Identification, algorithm_title
 from ema_model.identification.search import Objective
 from ema_model.identification.words import CORRECTED, verdict

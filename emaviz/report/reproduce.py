@@ -22,7 +22,7 @@ from ema_model.campaign.thesis import (
     Point,
     case_of,
 )
-from ema_model.quantities.shown import of_signal
+from ema_model.quantities.axes import of_signal
 from ema_model.quantities.titles import in_sentence
 from emaviz.figures import campaign, comparison
 from emaviz.figures.campaign import SearchEffort

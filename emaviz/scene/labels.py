@@ -13,7 +13,7 @@ import viser
 from numpy.typing import ArrayLike, NDArray
 
 from ema_model.actuator import Actuator
-from ema_model.actuator.readings import sentences
+from ema_model.actuator.actuator import sentences
 from ema_model.faults import FAULTS
 from emaviz.scene.framing import BOXES, Frame, frame
 from emaviz.scene.solids import FAULT, SATIN

@@ -12,8 +12,7 @@ from numpy.typing import NDArray
 
 from ema_model.actuator import Actuator, load_actuator, save_actuator
 from ema_model.actuator.describe import DRIVES, asked, described, entry_of, gear_of, implausible, missing, unanswered
-from ema_model.actuator.naming import on_axes
-from ema_model.actuator.parameters import facts_of
+from ema_model.actuator.parameters import facts_of, on_axes
 from ema_model.actuator.reference import usual_tolerance
 from ema_model.challenges import Challenge
 from ema_model.errors import InputError, quoted

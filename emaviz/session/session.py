@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ema_model.actuator import Actuator
-from ema_model.actuator.readings import sentences
+from ema_model.actuator.actuator import sentences
 from ema_model.errors import InputError, quoted
 from ema_model.faults import FAULTS, HEALTHY, NAMES
 from ema_model.identification.run import warm_up

@@ -6,7 +6,7 @@ import pytest
 from support.on_page import choose, field, wait_until
 
 from ema_model.actuator import load_actuator
-from ema_model.actuator.layout import says_drive
+from ema_model.actuator.parameters import says_drive
 from ema_model.actuator.reference import kinds_of_actuators, parameter_rows
 from ema_model.errors import InputError
 from ema_model.quantities.axes import Axes

@@ -22,7 +22,7 @@ from life_peers import Array, Quantiles, exponential_fit, particle_filter
 
 from ema_model import faults
 from ema_model.campaign.kinds.track import ALPHA, LAMBDA, LAMBDAS, Told, places
-from ema_model.estimation.unknowns import ECCENTRICITY, to_vector
+from ema_model.estimation.problem import ECCENTRICITY, to_vector
 from ema_model.lives import LAWS, Life, drawn, worn_life
 from ema_model.lives.life import ONSET, POWER, base_of
 from ema_model.tracking.flights import Flight

@@ -16,11 +16,18 @@ from worked_actuators import BALL_SCREW, WORKED
 
 from ema_model.actuator import load_actuator, save_actuator
 from ema_model.actuator.keys import ENTRY, HEAD, KINDS, TABLES
-from ema_model.actuator.layout import layout, says_drive
-from ema_model.actuator.naming import on_axes
-from ema_model.actuator.parameters import SECTIONS, Facts, facts_of, is_said, numbers
+from ema_model.actuator.parameters import (
+    SECTIONS,
+    Facts,
+    facts_of,
+    is_said,
+    layout,
+    numbers,
+    on_axes,
+    says_drive,
+    unread,
+)
 from ema_model.actuator.reference import kinds_of_actuators, markdown, parameter_rows
-from ema_model.actuator.unread import unread
 from ema_model.commands import command
 from ema_model.effects.user.entries import KEYS as USERS
 from ema_model.quantities.axes import Axes

@@ -219,14 +219,14 @@ ema_model.discovery.discover = discover
 TRACK = """
 import sys, time
 from ema_model.lives import drawn, worn_life
-from ema_model.tracking import identify
+from ema_model.tracking import flights
 
 def identify_all(*_):
     yield from drawn(worn_life("linear", 1))[:{flights}]
     print("ready", flush=True)
     time.sleep(60)
 
-identify.identify_all = identify_all
+flights.identify_all = identify_all
 """
 PROGRAM = """
 from emaviz.__main__ import program

@@ -13,8 +13,7 @@ from ema_model.effects import find
 from ema_model.estimation import calibrate, floor
 from ema_model.estimation.calibrate import calibrated, problem_of
 from ema_model.estimation.least_squares import Descent
-from ema_model.estimation.problem import TOGETHER
-from ema_model.estimation.unknowns import K_SIGMA, to_vector, unknowns_of
+from ema_model.estimation.problem import K_SIGMA, TOGETHER, to_vector, unknowns_of
 from ema_model.faults import HEALTHY, NAMES, vector
 from ema_model.identification.fit import setting
 from ema_model.identification.search import Objective

@@ -15,7 +15,7 @@ from ema_model.commands import command
 from ema_model.errors import InputError
 from ema_model.estimation.least_squares import Descent
 from ema_model.estimation.model_fit import with_effect
-from ema_model.estimation.unknowns import to_k, to_vector
+from ema_model.estimation.problem import to_k, to_vector
 from ema_model.identification.fit import TWINS, _spread, most_likely_spreads, refine, setting, twins
 from ema_model.identification.run import identify
 from ema_model.identification.search import Objective

@@ -12,11 +12,10 @@ import numpy as np
 import pytest
 
 from ema_model.actuator import Actuator, Tolerance, load_actuator, save_actuator
-from ema_model.actuator.naming import on_axes, path_inside
-from ema_model.actuator.parameters import SECTIONS, numbers
+from ema_model.actuator.parameters import SECTIONS, numbers, on_axes, path_inside
 from ema_model.effects import CATALOGUE, Parameter, find
 from ema_model.errors import InputError
-from ema_model.estimation.unknowns import unknowns_of
+from ema_model.estimation.problem import unknowns_of
 from ema_model.models.inverse_dynamics import InverseDynamics
 from ema_model.models.loop_window import cut
 from ema_model.quantities.axes import Axes
@@ -313,7 +312,7 @@ EFFECT = Effect(
 '''
 ASKED = """
 from ema_model.actuator import load_actuator
-from ema_model.actuator.naming import on_axes
+from ema_model.actuator.parameters import on_axes
 from ema_model.effects import CATALOGUE
 made = load_actuator("axis.toml")
 one = on_axes("effects.rubber_bumper.stiffness_Nm_rad", made.axes)

@@ -15,9 +15,19 @@ import numpy as np
 import pytest
 
 from ema_model.actuator import load_actuator, save_actuator
-from ema_model.actuator.layout import CONTROLLER_KINDS, INVERTER_KINDS, drives_of, layout, says_drive
-from ema_model.actuator.parameters import SECTIONS, numbers
-from ema_model.actuator.unread import INVERSE_PLACES, WINDING_PLACES, check_value_is_read, unread
+from ema_model.actuator.parameters import (
+    CONTROLLER_KINDS,
+    INVERSE_PLACES,
+    INVERTER_KINDS,
+    SECTIONS,
+    WINDING_PLACES,
+    check_value_is_read,
+    drives_of,
+    layout,
+    numbers,
+    says_drive,
+    unread,
+)
 from ema_model.effects import CATALOGUE
 from ema_model.errors import InputError
 from ema_model.faults import HEALTHY, vector

@@ -10,8 +10,7 @@ import numpy as np
 import pytest
 
 from ema_model.actuator import Actuator, load_actuator
-from ema_model.actuator.parameters import Inverter
-from ema_model.actuator.unread import idle
+from ema_model.actuator.parameters import Inverter, idle
 from ema_model.commands import command
 from ema_model.effects import CATALOGUE
 from ema_model.effects.acceleration_feedforward import goal as accelerated

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from ema_model.actuator import load_actuator
-from ema_model.actuator.readings import readings, sentences
+from ema_model.actuator.actuator import readings, sentences
 from ema_model.commands import command
 from ema_model.errors import InputError
 from ema_model.faults import FAULTS, HEALTHY, NAMES, error_percent, performance_coefficient, physical, vector

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ema_model import faults
-from ema_model.estimation.unknowns import to_vector
+from ema_model.estimation.problem import to_vector
 from ema_model.tracking.flights import Flight
 
 

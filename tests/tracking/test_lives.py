@@ -8,7 +8,7 @@ import pytest
 from ema_model import faults
 from ema_model.actuator import load_actuator
 from ema_model.errors import InputError
-from ema_model.estimation.unknowns import to_vector
+from ema_model.estimation.problem import to_vector
 from ema_model.identification.fit import refine, setting
 from ema_model.identification.search import Objective
 from ema_model.identification.uncertainty import uncertainty

@@ -21,7 +21,7 @@ from ema_model.discovery.candidates.unknown import TEETH
 from ema_model.discovery.criteria import LEAST_BIC
 from ema_model.discovery.result import Candidate
 from ema_model.estimation.model_fit import Data, Fit, fit
-from ema_model.estimation.unknowns import to_k, to_vector, unknowns_of
+from ema_model.estimation.problem import to_k, to_vector, unknowns_of
 from ema_model.faults import CAUSES, NAMES, cause_of
 from ema_model.side_by_side import fits
 

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ema_model.actuator import Actuator
-from ema_model.actuator.unread import idle
+from ema_model.actuator.parameters import idle
 from ema_model.discovery.evidence.extents import Ranges, moves_both_ways, ranges_of, top_speed
 from ema_model.effects import Effect, find
 from ema_model.effects.effect import USER

@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 from ema_model.actuator import Actuator
-from ema_model.actuator.all_is_read import check_represents
+from ema_model.actuator.file import check_represents
 from ema_model.comparison.compare import weights_of
 from ema_model.comparison.loop_lag import other_controller
 from ema_model.comparison.sentences import OPEN_LOOP
@@ -19,8 +19,7 @@ from ema_model.discovery.steps.step import Step, rung_of
 from ema_model.discovery.words import NOT_REPEATABLE, OPEN_LOOP_LEFT
 from ema_model.errors import InputError
 from ema_model.estimation.model_fit import Data, fit, floor_ratio, gather, in_floors_of, with_effect
-from ema_model.models.delay_of_drive import with_delay_of_drive
-from ema_model.models.measured_motion import fit_stretches
+from ema_model.models.measured_motion import fit_stretches, with_delay_of_drive
 from ema_model.recordings import Measurement
 from ema_model.recordings.read import check_same_actuator, prepared
 from ema_model.recordings.recording_set import check_held_out

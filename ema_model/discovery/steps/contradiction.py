@@ -14,16 +14,15 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from ema_model.actuator.naming import on_axes
+from ema_model.actuator.parameters import on_axes
 from ema_model.discovery.criteria import ANOTHER, MISSED, PUT_RIGHT, WIDER
 from ema_model.discovery.evidence.objections import ratio
 from ema_model.discovery.result import Contradiction
 from ema_model.errors import InputError
 from ema_model.estimation import calibrate
 from ema_model.estimation.model_fit import Data, Fit, fit, floor_ratio, gather, resimulated
-from ema_model.quantities.axes import Axes
+from ema_model.quantities.axes import Axes, of_signal
 from ema_model.quantities.numbers import amount, number
-from ema_model.quantities.shown import of_signal
 from ema_model.quantities.titles import in_sentence
 from ema_model.recordings import Measurement
 

@@ -12,7 +12,7 @@ from itertools import takewhile
 import numpy as np
 from numpy.typing import NDArray
 
-from ema_model.actuator.all_is_read import cannot_represent
+from ema_model.actuator.file import cannot_represent
 from ema_model.comparison.explain import Explanation
 from ema_model.comparison.loop_lag import LoopLag
 from ema_model.discovery.candidates.faults import fault_for, fault_trial, tried_faults, without_fault

@@ -10,7 +10,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 from ema_model.actuator import Actuator, Tolerance
-from ema_model.actuator.unread import INVERSE_PLACES
+from ema_model.actuator.parameters import INVERSE_PLACES
 from ema_model.comparison.criteria import BAND, MISSED
 from ema_model.comparison.loop_lag import LoopLag
 from ema_model.discovery.candidates.paid_for import pays

@@ -7,7 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from ema_model.actuator import Actuator
-from ema_model.actuator.naming import on_axes
+from ema_model.actuator.parameters import on_axes
 from ema_model.fleets import RUNS, UNSEEN, Fleet, draw, recorded
 from ema_model.practice.kinds.kind import Kind, Progress, Revealed, Truth
 from ema_model.quantities.titles import in_sentence

@@ -58,7 +58,7 @@ def documents() -> tuple[type, ...]:
 
 def run(arguments: argparse.Namespace) -> int:
     """Identifies; once interrupted, the best so far."""
-    from ema_model.actuator.all_is_read import check_represents
+    from ema_model.actuator.file import check_represents
     from emaviz.cli import flow, given
 
     actuator = given.actuator_of(arguments)
@@ -170,7 +170,7 @@ def _of_unseen(error: float | None, fitted: float, held: list[Measurement]) -> I
 
 def _say_so_far(history: list[Progress], actuator: Actuator, arguments: argparse.Namespace) -> None:
     """Writes and prints the best of a search that was interrupted, and how it came there."""
-    from ema_model.actuator.readings import sentences
+    from ema_model.actuator.actuator import sentences
     from ema_model.faults import NAMES
     from ema_model.identification.run import algorithm_title
     from ema_model.identification.words import so_far_as_dict

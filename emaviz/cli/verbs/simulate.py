@@ -56,7 +56,7 @@ def run(arguments: argparse.Namespace) -> int:
     """Simulates, records with the sensors' accuracy, writes."""
     import numpy as np
 
-    from ema_model.actuator.readings import readings
+    from ema_model.actuator.actuator import readings
     from ema_model.recordings import write_measurement
     from ema_model.recordings.measurement import Sensors
     from emaviz.cli import given, output

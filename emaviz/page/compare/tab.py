@@ -11,7 +11,7 @@ import viser
 
 from ema_model.actuator.describe import DRIVES
 from ema_model.actuator.keys import KINDS
-from ema_model.actuator.naming import on_axes
+from ema_model.actuator.parameters import on_axes
 from ema_model.errors import InputError
 from ema_model.quantities.axes import KINDS as AXES
 from ema_model.quantities.axes import Axes

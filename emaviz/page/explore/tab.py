@@ -15,13 +15,13 @@ import viser
 from numpy.typing import NDArray
 
 from ema_model.actuator import Actuator
-from ema_model.actuator.readings import sentences
+from ema_model.actuator.actuator import sentences
 from ema_model.commands import COMMANDS
 from ema_model.discovery.result import Experiment
 from ema_model.effects import CATALOGUE, find
 from ema_model.faults import FAULTS, HEALTHY, vector
 from ema_model.identification.uncertainty import Suggestion
-from ema_model.quantities.shown import of_signal
+from ema_model.quantities.axes import of_signal
 from ema_model.quantities.sides import USER
 from ema_model.quantities.titles import labelled
 from ema_model.simulation import plant

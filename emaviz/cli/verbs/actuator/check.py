@@ -57,8 +57,8 @@ def run(arguments: argparse.Namespace) -> int:
 
 def _beside(actuator: Actuator, arguments: argparse.Namespace) -> dict[str, list[str]]:
     """What the recording and a calibration by it say."""
-    from ema_model.actuator.naming import on_axes
-    from ema_model.actuator.steps import usual_filter
+    from ema_model.actuator.actuator import usual_filter
+    from ema_model.actuator.parameters import on_axes
     from emaviz.cli import given, output
 
     progress = output.Progress(arguments)
@@ -106,8 +106,7 @@ def _left(share: float) -> str:
 
 
 def _document(actuator: Actuator, found: dict[str, list[str]], arguments: argparse.Namespace) -> Document:
-    from ema_model.actuator.layout import says_drive
-    from ema_model.actuator.naming import on_axes
+    from ema_model.actuator.parameters import on_axes, says_drive
     from ema_model.quantities.titles import in_sentence
 
     free = [path for path, tolerance in actuator.tolerances.items() if tolerance.free]

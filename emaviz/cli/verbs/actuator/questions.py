@@ -7,8 +7,7 @@ from typing import Any
 
 from ema_model.actuator.describe import DRIVES, actuator_axes, asked, entry_of, gear_of, unanswered
 from ema_model.actuator.keys import KINDS
-from ema_model.actuator.naming import on_axes
-from ema_model.actuator.parameters import facts_of
+from ema_model.actuator.parameters import facts_of, on_axes
 from ema_model.errors import InputError
 from ema_model.quantities.axes import KINDS as AXES
 from emaviz.cli.options import SAMPLE_RATE

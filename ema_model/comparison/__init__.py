@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from ema_model.comparison.compare import compare
 from ema_model.comparison.explain import Explanation
-from ema_model.comparison.result import Compared, Comparison, Region, SignalError
-from ema_model.comparison.summary import as_dict
+from ema_model.comparison.regions import Region
+from ema_model.comparison.result import Compared, Comparison, SignalError, as_dict
 
 __all__ = ["Compared", "Comparison", "Explanation", "Region", "SignalError", "as_dict", "compare"]

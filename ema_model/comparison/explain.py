@@ -9,8 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import median_filter
 
-from ema_model.comparison.residuals import Residuals
-from ema_model.comparison.sentences import explanation_sentence
+from ema_model.comparison.residuals import Residuals, explanation_sentence
 from ema_model.quantities.axes import Axes
 from ema_model.quantities.variables import MODULATORS, VARIABLES
 from ema_model.recordings import SIGNALS

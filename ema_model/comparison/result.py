@@ -1,47 +1,45 @@
-"""What a comparison finds, in the words and numbers that the screen, the report and JSON show."""
+"""What a comparison finds: the result, its words, its JSON."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated, TypedDict, TypeVar, cast
 
 import numpy as np
+from msgspec import Meta
 from numpy.typing import NDArray
 
+from ema_model.actuator.parameters import on_axes
 from ema_model.comparison.explain import Explanation
-from ema_model.comparison.residuals import Residuals
-from ema_model.quantities.numbers import Quantity
-from ema_model.text import InWords
+from ema_model.comparison.free_simulation import Score, Simulated, without
+from ema_model.comparison.regions import Event, Region
+from ema_model.comparison.residuals import Residuals, dependence
+from ema_model.estimation.calibrate import Calibrated, Calibration, calibration_table
+from ema_model.quantities.axes import ROTARY, SIGNALS, Axes, of_residual, of_signal
+from ema_model.quantities.numbers import IntervalJson, Quantity, number
+from ema_model.quantities.titles import in_sentence
+from ema_model.quantities.variables import of_variable
+from ema_model.recordings.health import HealthJson
+from ema_model.recordings.noise import least_noise
+from ema_model.text import Document, InWords, Lines, Note, Severity, Table
 
 if TYPE_CHECKING:
     from ema_model.actuator import Actuator
-    from ema_model.comparison.events import Event
     from ema_model.comparison.explain import Order
     from ema_model.comparison.free_simulation import Simulated
+    from ema_model.comparison.regions import Event
     from ema_model.estimation.calibrate import Calibration
     from ema_model.recordings import Measurement
     from ema_model.recordings.health import Health
 
+
+# --- what a comparison finds, in the words and numbers that the screen, the report and JSON show ----------------------
+
 Array = NDArray[np.float64]
 
 COMPARISON_VERDICTS = ("adequate", "not_adequate", "uninformative")
-
-
-@dataclass(frozen=True, eq=False)
-class Region:
-    """A range of a variable in which the model fails most."""
-
-    signal: str
-    variable: str
-    low: float
-    high: float
-    rmse: float  # in the signal's unit
-    mean: float  # of the residual, likewise
-    excess: float  # rmse over the floor there
-    sentence: str  # "The motor needs 35.2 mN·m more torque at 300 rad/s than the model."
-    blocks: NDArray[np.bool_]  # (blocks,) of the joined residuals
 
 
 @dataclass(frozen=True)
@@ -103,3 +101,472 @@ class Comparison(InWords):
     def verdict(self) -> str:
         """One of `COMPARISON_VERDICTS`."""
         return "uninformative" if self.uninformative else "adequate" if self.adequate else "not_adequate"
+
+
+# --- a comparison in words: its sentences, the errors, what explains them, the calibration ----------------------------
+
+_NEAR_FLOOR, _FAR_FROM_FLOOR = 1.2, 2.0  # error over floor, from which on one is looked at, and stands out
+FREE_NOTE = (
+    "Free simulation: the model runs from the recordings' first state on, driven by the command alone, or in open loop "
+    "by the recorded current, torque or force; nothing of the measured motion is fed back. Where the controller is not "
+    "known, position and speed at the start and one constant offset of what is put in are estimated in each recording."
+)
+_TOLD = 2.0  # times the least that any noise can be, from which on a recording tells it
+_MOST_TOLD = 6  # held-out recordings, each in a line of its own
+
+
+def held_out(one: Compared) -> str:
+    """'chirp was not fitted: the equivalent current is off by 0.42 A (floor 0.31 A), …'."""
+    told = []
+    for name, error in one.errors.items():
+        shown = error.quantity(of_signal(name, ROTARY))  # by the name in files, which says all
+        floor = f" (floor {shown.text(error.noise_floor)})" if _has_floor(name, error) else ""
+        told.append(f"{in_sentence(shown.title)} {shown.text(error.rmse)}{floor}")
+    return f"{one.name or 'the recording'} was not fitted; the calibrated model is off by: {', '.join(told)}"
+
+
+def verdict(result: Comparison) -> str:
+    """'not adequate'."""
+    return result.verdict.replace("_", " ")
+
+
+def of_floor(result: Comparison) -> str:
+    """'All signals together, the error is 1.02 times the floor; a true model's is 0.97 to 1.03 (90 % interval).'"""
+    low, high = result.floor_band
+    error = f"All signals together, the error is {number(result.over_floor)} times the floor"
+    return f"{error}; a true model's is {low:.2f} to {high:.2f} (90 % interval)."
+
+
+def document_of(result: Comparison) -> Document:
+    """All that is shown of it in words."""
+    notes = [Note(warning) for warning in result.warnings]
+    free = free_simulation(result.simulation, result.actuator.axes)
+    return Document(
+        [
+            Lines([*result.sentences, of_floor(result)]),
+            *notes,
+            errors(result),
+            *free,
+            *_recordings(result),
+            *_why(result),
+        ]
+    )
+
+
+def errors(result: Comparison) -> Table:
+    """Of each signal, over all recordings that were fitted."""
+    axes = result.actuator.axes
+    return _words_errors(
+        "signal", result, [(of_signal(name, axes).title, name, one, "") for name, one in result.signals.items()]
+    )
+
+
+def errors_by_recording(result: Comparison, signal: str) -> Table | None:
+    """Of one signal, in each recording, fitted or not; None where there is but one."""
+    every = [(one, "") for one in result.recordings] + [(one, ", held out") for one in result.holdout]
+    known = [(one.name, signal, one.errors[signal], how) for one, how in every if signal in one.errors]
+    title = in_sentence(of_signal(signal, result.actuator.axes).title)
+    return _words_errors(f"recording, {title}", result, known) if len(known) > 1 else None
+
+
+def _words_errors(title: str, result: Comparison, of: Sequence[tuple[str, str, SignalError, str]]) -> Table:
+    """of: by row its name, the signal, its error, and what else is to be said."""
+    rows, units, severities = [], [], []
+    for name, signal, error, said in of:
+        shown = error.quantity(of_signal(signal, result.actuator.axes))
+        floor = error.noise_floor if _has_floor(signal, error) else math.nan
+        over = error.rmse / floor
+        before = [error.rmse_initial] if result.calibration is not None else []
+        numbers = [number(shown.factor * one) for one in (*before, error.rmse, floor)]
+        mean, share = number(shown.factor * error.mean_absolute), f"{number(100.0 * error.nrmse)} %"
+        rows.append([name, *numbers, mean, share, number(over)])
+        units.append(f"{shown.unit}{said}{', uninformative' if error.silent else ''}")
+        severities.append(_severity(over) if math.isfinite(over) and not error.silent else "note")
+    head = ["before"] if result.calibration is not None else []
+    head += ["rms error", "floor", "mean |e|", "of range", "error / floor"]
+    return Table(head, rows, title, units, severities=severities)
+
+
+def free_simulation(simulation: Mapping[str, Simulated], axes: Axes) -> list[Table | Lines]:
+    """The errors of the model running freely, and a line for each signal that has none."""
+    if not simulation:
+        return []
+    held = any(one.holdout is not None for one in simulation.values())
+    rows, units, said = [], [], []
+    for name, one in simulation.items():
+        scores = [one.fitted, *([one.holdout or without("")] if held else [])]
+        shown = of_signal(name, axes).scaled([score.rmse for score in scores])
+        rows.append([shown.title, *(cell for score in scores for cell in _score(score, shown))])
+        units.append(shown.unit)
+        for what, score in zip(("", " on what was not fitted"), scores):
+            if score.reason:
+                said.append(f"No free simulation of the {in_sentence(shown.title)}{what}: {score.reason}.")
+        if one.at_fitted_offset is not None and math.isfinite(one.at_fitted_offset.rmse):
+            size = shown.text(one.at_fitted_offset.rmse)
+            said.append(
+                f"Held out, with the fitted recordings' offset instead of its own, the {in_sentence(shown.title)} "
+                f"is off by {size} rms."
+            )
+    head = ["rms error", "mean |e|", "of range"]
+    head += ["held out: rms", "mean |e|", "of range"] if held else []
+    return [Table(head, rows, "free simulation", units), *([Lines(said)] if said else [])]
+
+
+def _score(score: Score, shown: Quantity) -> list[str]:
+    """rms error, mean absolute error, and share of the range; '–' where there is none."""
+    numbers = [number(shown.factor * one) if math.isfinite(one) else "–" for one in (score.rmse, score.mae)]
+    return [*numbers, f"{number(score.percent_of_range)} %" if math.isfinite(score.percent_of_range) else "–"]
+
+
+def _has_floor(signal: str, error: SignalError) -> bool:
+    """Whether a recording tells the signal's noise; that of a speed which is 0 for most of the time does not."""
+    return error.noise_floor > _TOLD * least_noise(signal)
+
+
+def _severity(over: float) -> Severity:
+    return "good" if over < _NEAR_FLOOR else "warning" if over < _FAR_FROM_FLOOR else "bad"
+
+
+def details(result: Comparison, region: Region) -> str:
+    """'Motor angle 10 … 20 °: residual current 42 mA rms, 40 mA on average; 2.3 times the floor, …'"""
+    axes = result.actuator.axes
+    axis = of_variable(region.variable, axes).scaled([region.low, region.high])
+    shown = of_residual(region.signal, axes).scaled(region.rmse)
+    low, high = (number(axis.factor * value) for value in (region.low, region.high))
+    return (
+        f"{axis.title} {low} … {high} {axis.unit}: {in_sentence(shown.title)} {shown.text(region.rmse)} rms, "
+        f"{shown.text(region.mean)} on average; {number(region.excess)} times the floor, "
+        f"in {np.count_nonzero(region.blocks)} of {len(region.blocks)} blocks."
+    )
+
+
+def _recordings(result: Comparison) -> Iterator[Table | Lines]:
+    if (table := errors_by_recording(result, result.primary)) is not None:
+        yield table
+    if 0 < len(result.holdout) <= _MOST_TOLD:
+        yield Lines([held_out(one) for one in result.holdout])
+
+
+def _why(result: Comparison) -> Iterator[Table | Lines]:
+    axes = result.actuator.axes
+    if result.explained_by:
+        rows, remarks = [], []
+        for one in result.explained_by[:6]:
+            rows.append([dependence(one.variable, one.modulator), f"{100.0 * one.r2:.1f} %"])
+            remarks.append("" if one.significant else "within noise")
+        yield Table(
+            ("cross-validated",), rows, "what explains the residual", remarks, "share of its variance; shares overlap"
+        )
+    if result.orders:
+        told = of_residual(result.primary, axes, result.residuals.torque_constant)
+        shown = told.scaled(result.orders[0].amplitude)
+        found = ", ".join(f"{one.order} ({shown.text(one.amplitude)})" for one in result.orders[:8])
+        yield Lines([f"orders per revolution: {found}"])
+    if result.calibration is not None and (table := calibration_table(result.calibration, axes)) is not None:
+        yield table
+
+
+# --- a comparison in plain numbers, as `emaviz compare --json` writes it ----------------------------------------------
+# What each field means, and where it is from.
+
+_Value = TypeVar("_Value")
+
+
+class SignalErrorJson(TypedDict):
+    """How far the model is from one signal, in the unit that ends the signal's name."""
+
+    rmse: Annotated[float | None, Meta(description="root mean square of measurement − model; null: it diverges")]
+    nrmse: Annotated[float | None, Meta(description="rmse over the range of the measured signal; null: it is constant")]
+    noise_floor: Annotated[
+        float | None, Meta(description="rms that a perfect model would leave: noise and model floor")
+    ]
+    rmse_initial: Annotated[float | None, Meta(description="rmse before the calibration, with the file's parameters")]
+    mean_absolute: Annotated[float | None, Meta(description="mean of |measurement − model|")]
+    informative: Annotated[
+        bool, Meta(description="false: the signal is constant, or no larger than its floor, and tells nothing")
+    ]
+
+
+class SimulatedJson(TypedDict):
+    """How far the model is from one signal when it runs freely from the recordings' first state on."""
+
+    rmse: Annotated[float | None, Meta(description="rms error over all fitted recordings; null: see reason")]
+    mae: Annotated[float | None, Meta(description="mean absolute error, likewise")]
+    percent_of_range: Annotated[float | None, Meta(description="rmse, % of the measured signal's range")]
+    reason: Annotated[str, Meta(description="why there is no number; empty where there is one")]
+    holdout_rmse: Annotated[float | None, Meta(description="rmse of recordings that were not fitted; null: none")]
+    holdout_mae: Annotated[float | None, Meta(description="mae of the same")]
+    holdout_percent_of_range: Annotated[float | None, Meta(description="percent_of_range of the same")]
+    holdout_reason: Annotated[str, Meta(description="why there is no number of those that were held out")]
+    holdout_rmse_at_fitted_offset: Annotated[
+        float | None,
+        Meta(description="holdout_rmse in open loop with the fitted recordings' offset, not with their own"),
+    ]
+    unit: Annotated[str, Meta(description="of rmse and mae")]
+
+
+class ParameterJson(TypedDict):
+    """A calibrated parameter, in its `unit`."""
+
+    value: Annotated[float, Meta(description="what was found")]
+    initial: Annotated[float, Meta(description="what the actuator's file says")]
+    interval90: Annotated[IntervalJson, Meta(description="the ends of the 90 % interval about value")]
+    unit: Annotated[str, Meta(description="of value, initial and interval90; empty for a ratio")]
+    z: Annotated[float, Meta(description="value − initial, in σ of the file's tolerance")]
+    at_bound: Annotated[bool, Meta(description="whether the fit ended at the end of what is allowed")]
+
+
+class CalibrationJson(TypedDict):
+    """The fit of the actuator's parameters within their tolerances."""
+
+    converged: Annotated[bool, Meta(description="whether several starts end in the same minimum")]
+    evaluations: Annotated[int, Meta(description="how many times the recordings were simulated")]
+    parameters: Annotated[
+        dict[str, ParameterJson], Meta(description="by the names in the actuator's file, section.name, and k1 … k8")
+    ]
+    starts: Annotated[
+        dict[str, ParameterJson],
+        Meta(
+            description="of the recordings: turned N is the motor's offset at the start, faster N its speed's, play N "
+            "where in the backlash it was, lag N by how much later than the positions the current was recorded"
+        ),
+    ]
+    outside_tolerance: Annotated[list[str], Meta(description="parameters that end at the edge of their tolerance")]
+    confounded: Annotated[list[list[str]], Meta(description="pairs of parameters that are known only together")]
+
+
+class ExplanationJson(TypedDict):
+    """How much of a residual one variable tells ahead, times a modulator."""
+
+    variable: Annotated[str, Meta(description="motor_angle, user_position, motor_speed, acceleration, current, …")]
+    modulator: Annotated[str, Meta(description="what the curve is multiplied by: 1, current or sign_speed")]
+    r2: Annotated[
+        float | None, Meta(description="share of the residual's power as it is, cross-validated; shares overlap")
+    ]
+    significant: Annotated[bool, Meta(description="whether noise alone would seldom show as much")]
+    signal: Annotated[str, Meta(description="whose residual it is")]
+    sentence: Annotated[str, Meta(description="the same in words")]
+
+
+class OrderJson(TypedDict):
+    """A part of the primary residual that repeats with the motor: amplitude · sin(order · θ + phase)."""
+
+    order: Annotated[float, Meta(description="periods per revolution; rad/m where the motor's axis is linear")]
+    amplitude: Annotated[float, Meta(description="in the primary signal's unit")]
+    phase_rad: Annotated[float, Meta(description="rad")]
+
+
+_Range = TypedDict(
+    "_Range",
+    {
+        "from": Annotated[float, Meta(description="where the range begins, in the variable's SI unit")],
+        "to": Annotated[float, Meta(description="where it ends, likewise")],
+    },
+)
+
+
+class RegionJson(_Range):
+    """A range of a variable in which the model fails most."""
+
+    signal: Annotated[str, Meta(description="whose residual it is")]
+    variable: Annotated[str, Meta(description="what the range is of: motor_speed, time, …")]
+    rmse: Annotated[float | None, Meta(description="of the residual there, in the signal's unit")]
+    mean: Annotated[float | None, Meta(description="of the residual there, measurement − model, in the signal's unit")]
+    sentence: Annotated[str, Meta(description="the same in words")]
+
+
+class EventJson(TypedDict):
+    """A step of a residual at one moment of a recording."""
+
+    recording: Annotated[str, Meta(description="its name")]
+    time_s: Annotated[float, Meta(description="s, as recorded")]
+    signal: Annotated[str, Meta(description="whose residual it is")]
+    change: Annotated[float, Meta(description="after less before, in the signal's unit")]
+    by_direction: Annotated[bool, Meta(description="whether it turns over with the direction of motion, as friction")]
+    share: Annotated[float, Meta(description="0 … 1, of what the signal's residual has beyond its floor")]
+    sentence: Annotated[str, Meta(description="the same in words")]
+
+
+class HeldOutJson(TypedDict):
+    """One recording beside the model."""
+
+    name: Annotated[str, Meta(description="the file's name without its ending, #N for the run N of a file")]
+    signals: Annotated[dict[str, SignalErrorJson], Meta(description="its errors, by signal")]
+
+
+class ComparedJson(HeldOutJson):
+    """One fitted recording beside the model."""
+
+    notes: Annotated[list[str], Meta(description="what reading it found and did")]
+    health: Annotated[HealthJson, Meta(description="what its own numbers say of its quality")]
+
+
+class ComparisonJson(TypedDict):
+    """Where the model fails beside the recordings of one actuator."""
+
+    verdict: Annotated[str, Meta(description=f"one of {', '.join(COMPARISON_VERDICTS)}")]
+    adequate: Annotated[bool, Meta(description="whether what is left may be noise and the model's own floor")]
+    over_floor: Annotated[
+        float | None, Meta(description="rms error pooled over signals, in units of the floor; 1 is the floor")
+    ]
+    floor_band: Annotated[list[float], Meta(description="between which over_floor of nine of ten true models lies")]
+    sentences: Annotated[list[str], Meta(description="the answer in words, the first one first")]
+    warnings: Annotated[list[str], Meta(description="what the answer must be read with")]
+    signals: Annotated[dict[str, SignalErrorJson], Meta(description="errors over all fitted recordings, by signal")]
+    primary: Annotated[str, Meta(description="the signal whose residual is explained")]
+    calibration: Annotated[CalibrationJson | None, Meta(description="null where none was asked for")]
+    explained_by: Annotated[list[ExplanationJson], Meta(description="what goes with the primary residual, best first")]
+    orders: Annotated[list[OrderJson], Meta(description="of the primary residual, strongest first; significant ones")]
+    worst_regions: Annotated[list[RegionJson], Meta(description="where the model fails most, worst first")]
+    events: Annotated[list[EventJson], Meta(description="what happened at one moment")]
+    simulation: Annotated[
+        dict[str, SimulatedJson],
+        Meta(description="of the model running freely, driven by the command, or in open loop; by signal"),
+    ]
+    recordings: Annotated[list[ComparedJson], Meta(description="those that were fitted, one by one")]
+    holdout: Annotated[list[HeldOutJson], Meta(description="those that were not fitted, beside the calibrated model")]
+
+
+def as_dict(comparison: Comparison) -> ComparisonJson:
+    """Everything but the series, in numbers and texts that JSON can hold; unknown numbers are None."""
+    document: ComparisonJson = {
+        "verdict": comparison.verdict,
+        "adequate": comparison.adequate,
+        "over_floor": comparison.over_floor,
+        "floor_band": list(comparison.floor_band),
+        "sentences": list(comparison.sentences),
+        "warnings": list(comparison.warnings),
+        "signals": {name: _error(error) for name, error in comparison.signals.items()},
+        "primary": comparison.primary,
+        "calibration": None
+        if comparison.calibration is None
+        else calibration_dict(comparison.calibration, comparison.actuator.axes),
+        "explained_by": [
+            {
+                "variable": one.variable,
+                "modulator": one.modulator,
+                "r2": one.r2,
+                "significant": one.significant,
+                "signal": one.signal,
+                "sentence": one.sentence,
+            }
+            for one in comparison.explained_by
+        ],
+        "orders": [
+            {"order": one.order, "amplitude": one.amplitude, "phase_rad": one.phase} for one in comparison.orders
+        ],
+        "worst_regions": [_region(one) for one in comparison.worst_regions],
+        "events": [event_dict(one) for one in comparison.events],
+        "simulation": simulation_dict(comparison.simulation),
+        "recordings": [_compared(one) for one in comparison.recordings],
+        "holdout": [{"name": one.name, "signals": _summary_errors(one)} for one in comparison.holdout],
+    }
+    return plain(document)
+
+
+def _region(one: Region) -> RegionJson:
+    return {
+        "signal": one.signal,
+        "variable": one.variable,
+        "from": one.low,
+        "to": one.high,
+        "rmse": one.rmse,
+        "mean": one.mean,
+        "sentence": one.sentence,
+    }
+
+
+def _compared(one: Compared) -> ComparedJson:
+    return {
+        "name": one.name,
+        "notes": list(one.measurement.notes),
+        "health": one.health.as_dict(),
+        "signals": _summary_errors(one),
+    }
+
+
+def _summary_errors(one: Compared) -> dict[str, SignalErrorJson]:
+    return {name: _error(error) for name, error in one.errors.items()}
+
+
+def event_dict(one: Event) -> EventJson:
+    """A step at one moment of a recording."""
+    return {
+        "recording": one.name,
+        "time_s": one.time_s,
+        "signal": one.signal,
+        "change": one.change,
+        "by_direction": one.by_direction,
+        "share": one.share,
+        "sentence": one.sentence,
+    }
+
+
+def simulation_dict(simulation: Mapping[str, Simulated]) -> dict[str, SimulatedJson]:
+    """The free simulation's errors by signal; numbers that are not known are NaN."""
+    found: dict[str, SimulatedJson] = {}
+    for name, one in simulation.items():
+        held = one.holdout or without("")
+        found[name] = {
+            "rmse": one.fitted.rmse,
+            "mae": one.fitted.mae,
+            "percent_of_range": one.fitted.percent_of_range,
+            "reason": one.fitted.reason,
+            "holdout_rmse": held.rmse,
+            "holdout_mae": held.mae,
+            "holdout_percent_of_range": held.percent_of_range,
+            "holdout_reason": held.reason,
+            "holdout_rmse_at_fitted_offset": (one.at_fitted_offset or without("")).rmse,
+            "unit": SIGNALS[name].unit,
+        }
+    return found
+
+
+def _error(error: SignalError) -> SignalErrorJson:
+    return {
+        "rmse": error.rmse,
+        "nrmse": error.nrmse,
+        "noise_floor": error.noise_floor,
+        "rmse_initial": error.rmse_initial,
+        "mean_absolute": error.mean_absolute,
+        "informative": not error.silent,
+    }
+
+
+def calibration_dict(calibration: Calibration, axes: Axes) -> CalibrationJson:
+    """A calibration's parameters by the names in files."""
+    return {
+        "converged": calibration.converged,
+        "evaluations": calibration.evaluations,
+        "parameters": {on_axes(name, axes).path: parameter_dict(one) for name, one in calibration.parameters.items()},
+        "starts": {name: parameter_dict(one) for name, one in calibration.starts.items()},
+        "outside_tolerance": [on_axes(name, axes).path for name in calibration.outside_tolerance],
+        "confounded": [[on_axes(a, axes).path, on_axes(b, axes).path] for a, b in calibration.confounded],
+    }
+
+
+def parameter_dict(one: Calibrated) -> ParameterJson:
+    """One calibrated parameter."""
+    return {
+        "value": one.value,
+        "initial": one.initial,
+        "interval90": list(one.interval90),
+        "unit": one.unit,
+        "z": one.z,
+        "at_bound": one.at_bound,
+    }
+
+
+def plain(value: _Value) -> _Value:
+    """The value in types that JSON has; numbers that are not finite are None."""
+    return cast(_Value, _plain(value))
+
+
+def _plain(value: object) -> object:
+    if isinstance(value, dict):
+        return {key: _plain(one) for key, one in value.items()}
+    if isinstance(value, list | tuple):
+        return [_plain(one) for one in value]
+    if isinstance(value, np.generic):
+        value = value.item()
+    return None if isinstance(value, float) and not np.isfinite(value) else value

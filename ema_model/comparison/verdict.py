@@ -11,12 +11,10 @@ from numpy.typing import NDArray
 from ema_model.actuator import Actuator
 from ema_model.actuator.parameters import on_axes
 from ema_model.comparison.criteria import BEYOND, SLOW
-from ema_model.comparison.events import Event, events
 from ema_model.comparison.explain import Explanation, Order, explain, residual_orders, used_blocks
-from ema_model.comparison.regions import worst_regions
-from ema_model.comparison.residuals import Residuals
-from ema_model.comparison.result import Compared, Region, SignalError
-from ema_model.comparison.sentences import OPEN_LOOP, order_sentence
+from ema_model.comparison.regions import Event, Region, events, worst_regions
+from ema_model.comparison.residuals import OPEN_LOOP, Residuals, order_sentence
+from ema_model.comparison.result import Compared, SignalError
 from ema_model.estimation import Calibration
 from ema_model.estimation.floor import CONSTANT, CORRELATED_S, ORDER_OF_PRIMARY, POSITIONS, SPEED
 from ema_model.quantities.axes import of_residual, of_signal

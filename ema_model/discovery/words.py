@@ -17,20 +17,20 @@ from ema_model.actuator.actuator import sentences as phrases_of
 from ema_model.actuator.parameters import on_axes
 from ema_model.comparison.criteria import BAND
 from ema_model.comparison.loop_lag import BLAMED, LoopLag
-from ema_model.comparison.sentences import dependence
-from ema_model.comparison.summary import (
+from ema_model.comparison.residuals import dependence
+from ema_model.comparison.result import (
     CalibrationJson,
     EventJson,
     ParameterJson,
     SimulatedJson,
     calibration_dict,
     event_dict,
+    free_simulation,
     parameter_dict,
     plain,
     simulation_dict,
 )
 from ema_model.comparison.verdict import ORDER_OF_PRIMARY, most_of_floor
-from ema_model.comparison.words import free_simulation
 from ema_model.discovery.criteria import FAR
 from ema_model.discovery.observed.controller import ControllerSeen
 from ema_model.discovery.result import VERDICTS, Added, Candidate, Change, Discovery, Experiment, Rung, misses_unseen

@@ -10,7 +10,7 @@ from msgspec import Meta
 
 from ema_model.actuator import Actuator
 from ema_model.actuator.parameters import on_axes
-from ema_model.comparison.summary import ParameterJson, parameter_dict
+from ema_model.comparison.result import ParameterJson, parameter_dict
 from ema_model.discovery import Added, Discovery, discover
 from ema_model.discovery import as_dict as of_discovery
 from ema_model.discovery.words import DiscoveryJson, effect_title

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from ema_model.actuator import Actuator
-from ema_model.comparison.summary import plain
+from ema_model.comparison.result import plain
 from ema_model.errors import InputError, did_you_mean, quoted
 from ema_model.files.opened import FILE_BYTES, listed
 from ema_model.recordings import Measurement, read_header

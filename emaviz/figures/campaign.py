@@ -10,7 +10,8 @@ import numpy as np
 import plotly.graph_objects as go
 
 from ema_model.actuator.parameters import on_axes
-from ema_model.comparison.result import Comparison, Region
+from ema_model.comparison.regions import Region
+from ema_model.comparison.result import Comparison
 from ema_model.faults import NAMES
 from ema_model.quantities.axes import ROTARY, Axes, of_signal
 from ema_model.quantities.numbers import number

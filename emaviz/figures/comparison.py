@@ -7,7 +7,8 @@ import plotly.graph_objects as go
 from numpy.typing import NDArray
 from plotly.subplots import make_subplots
 
-from ema_model.comparison.result import Comparison, Region
+from ema_model.comparison.regions import Region
+from ema_model.comparison.result import Comparison
 from ema_model.errors import InputError
 from ema_model.estimation.floor import BAND_SIGMAS
 from ema_model.quantities import axes as axes_quantities

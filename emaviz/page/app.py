@@ -21,11 +21,10 @@ from emaviz.page import compare, explore
 from emaviz.page.charts import add_chart_tools
 from emaviz.page.docked import LEFT_PX, Docked
 from emaviz.page.explore.tab import ExploreTab
-from emaviz.page.page import Page
 from emaviz.page.panel import follow_theme
 from emaviz.page.playback import PlaybackStrip
 from emaviz.page.tab import AnyTab, Shared, Standings, Tab
-from emaviz.page.workspaces import Workspace, Workspaces
+from emaviz.page.workspaces import Page, Workspace, Workspaces
 from emaviz.recording.viewer import ViewerHost
 from emaviz.scene.actuator import ActuatorScene
 from emaviz.server.door import Door

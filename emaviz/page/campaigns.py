@@ -11,9 +11,9 @@ import viser
 from ema_model.campaign.store import Store, summaries
 from ema_model.errors import InputError
 from ema_model.recordings import Measurement
-from emaviz.page.page import Page
 from emaviz.page.panel import JobLine
 from emaviz.page.tab import Standing
+from emaviz.page.workspaces import Page
 from emaviz.session.campaigns import Campaigns
 from emaviz.session.inputs import Provenance
 from emaviz.session.worker import Worker

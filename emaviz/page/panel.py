@@ -10,8 +10,8 @@ from typing import Any, Protocol
 import viser
 
 from ema_model.text import InWords
-from emaviz.page.page import Page
 from emaviz.page.style import IN_ROW
+from emaviz.page.workspaces import Page
 from emaviz.recording.viewer import ViewerHost
 from emaviz.server.viser_private import Inside
 from emaviz.session.data_folder import DataFolder

@@ -13,9 +13,9 @@ from ema_model.actuator import Actuator
 from emaviz.colours import rgb
 from emaviz.figures.theme import DARK, LIGHT
 from emaviz.page.charts import send_picture
-from emaviz.page.page import Page
 from emaviz.page.style import STRIP, caption, figures
 from emaviz.page.style import page as style
+from emaviz.page.workspaces import Page
 from emaviz.scene.actuator import ActuatorScene
 from emaviz.scene.playback import SPEEDS, Motion, Playback
 from emaviz.session.settings import checked, limits, setting, taken

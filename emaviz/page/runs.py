@@ -19,10 +19,9 @@ from emaviz.figures import comparison, runs
 from emaviz.figures.identification import named
 from emaviz.page.campaigns import CampaignControls
 from emaviz.page.docked import COLUMNS
-from emaviz.page.page import Page
 from emaviz.page.panel import recording_link
 from emaviz.page.tab import Shared, Tab
-from emaviz.page.workspaces import Workspace
+from emaviz.page.workspaces import Page, Workspace
 from emaviz.recording.entry import Entry, error_said, setting
 from emaviz.recording.read import Recording
 from emaviz.recording.viewer import ViewerHost

@@ -12,9 +12,8 @@ from typing import Any, ClassVar, TypeVar, cast
 import viser
 
 from ema_model.text import COLOURS
-from emaviz.page.page import Page
 from emaviz.page.playback import PlaybackStrip
-from emaviz.page.workspaces import Workspace, Workspaces
+from emaviz.page.workspaces import Page, Workspace, Workspaces
 from emaviz.recording.viewer import ViewerHost
 from emaviz.server.uploads import Uploads
 from emaviz.server.viser_private import id_of

@@ -11,10 +11,9 @@ import viser
 from ema_model.units.result import UnitsCompared, document_of, lacking, notes, rests_on, sentences
 from emaviz.figures import units
 from emaviz.page.docked import COLUMNS, NEXT_COLUMN, PLOTS_EARLY
-from emaviz.page.page import Page
 from emaviz.page.panel import REPORT, FolderChoice, JobLine, KeepButtons, Keeps, PracticeButtons, Seal
 from emaviz.page.tab import Shared, Standing, Tab
-from emaviz.page.workspaces import Workspace
+from emaviz.page.workspaces import Page, Workspace
 from emaviz.session.saved import Part
 from emaviz.session.units import TYPE, ComparingUnits
 from emaviz.text.html import BOX, DIM, Html, add_html, begin, html, joined, note

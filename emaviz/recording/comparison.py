@@ -10,9 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ema_model.comparison.regions import worst_moment
-from ema_model.comparison.result import Compared, Comparison
-from ema_model.comparison.summary import as_dict
-from ema_model.comparison.words import details, verdict
+from ema_model.comparison.result import Compared, Comparison, as_dict, details, verdict
 from ema_model.errors import InputError
 from ema_model.estimation.calibrate import convergence, warnings
 from ema_model.estimation.floor import BAND_SIGMAS

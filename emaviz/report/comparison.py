@@ -6,10 +6,10 @@ from pathlib import Path
 
 import numpy as np
 
-from ema_model.comparison.regions import worst_moment
-from ema_model.comparison.result import Comparison, Region
-from ema_model.comparison.words import (
+from ema_model.comparison.regions import Region, worst_moment
+from ema_model.comparison.result import (
     FREE_NOTE,
+    Comparison,
     details,
     errors,
     errors_by_recording,

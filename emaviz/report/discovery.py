@@ -10,7 +10,7 @@ from typing import Any
 import numba
 import numpy as np
 
-from ema_model.comparison.words import FREE_NOTE, free_simulation
+from ema_model.comparison.result import FREE_NOTE, free_simulation
 from ema_model.discovery import Discovery, words
 from ema_model.discovery.result import Added
 from ema_model.discovery.words import (

@@ -12,7 +12,7 @@ from support.unknown_drive import drive_of, logged
 from ema_model.actuator import load_actuator
 from ema_model.commands import command
 from ema_model.comparison import as_dict, compare
-from ema_model.comparison.words import errors, held_out, verdict
+from ema_model.comparison.result import errors, held_out, verdict
 from ema_model.discovery import discover
 from ema_model.estimation.floor import floor
 from ema_model.identification.run import identify

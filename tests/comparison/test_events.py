@@ -11,8 +11,8 @@ from support.representative import first_of
 
 from ema_model.commands import command
 from ema_model.comparison import compare
-from ema_model.comparison.events import _at_once
-from ema_model.comparison.summary import as_dict
+from ema_model.comparison.regions import _at_once
+from ema_model.comparison.result import as_dict
 from ema_model.discovery import discover
 from ema_model.recordings import Measurement
 from ema_model.recordings.measurement import Sensors

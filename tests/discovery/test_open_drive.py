@@ -8,7 +8,7 @@ from support.pushed import pushed
 from support.unknown_drive import drive_of
 
 from ema_model.comparison import compare
-from ema_model.comparison.sentences import OPEN_LOOP
+from ema_model.comparison.residuals import OPEN_LOOP
 from ema_model.discovery import Discovery, discover
 from ema_model.discovery.words import OPEN_LOOP_LEFT
 

@@ -10,7 +10,7 @@ import pytest
 from ema_model.actuator import load_actuator
 from ema_model.commands import command
 from ema_model.comparison import compare
-from ema_model.comparison.sentences import OPEN_LOOP
+from ema_model.comparison.residuals import OPEN_LOOP
 from ema_model.discovery import begun
 from ema_model.discovery.words import OPEN_LOOP_LEFT
 from ema_model.errors import InputError

@@ -13,7 +13,7 @@ from support.duty_bench import Bench, logged, staircase
 from ema_model.actuator import load_actuator
 from ema_model.actuator.describe import described
 from ema_model.comparison import compare
-from ema_model.comparison.sentences import OPEN_LOOP
+from ema_model.comparison.residuals import OPEN_LOOP
 from ema_model.errors import InputError
 from ema_model.estimation.calibrate import told
 from ema_model.models.open_loop import simulate_open_loop

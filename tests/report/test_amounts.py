@@ -7,9 +7,8 @@ from dataclasses import replace
 
 import pytest
 
-from ema_model.comparison.result import SignalError
+from ema_model.comparison.result import SignalError, held_out
 from ema_model.comparison.verdict import judge
-from ema_model.comparison.words import held_out
 from emaviz.page.compare.result import numbers
 from emaviz.recording.writer import written
 from emaviz.report.comparison import ErrorsPerSignal

@@ -12,8 +12,9 @@ from scipy.ndimage import uniform_filter1d
 from ema_model.actuator import Actuator, load_actuator
 from ema_model.commands import command
 from ema_model.comparison.explain import Explanation, Order
+from ema_model.comparison.regions import Region
 from ema_model.comparison.residuals import Residuals, join
-from ema_model.comparison.result import Compared, Comparison, Region, SignalError
+from ema_model.comparison.result import Compared, Comparison, SignalError
 from ema_model.estimation.calibrate import Calibrated, Calibration
 from ema_model.quantities.titles import unit_of
 from ema_model.recordings.health import health

@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 
 from ema_model.actuator import Actuator
 from ema_model.comparison.criteria import BAND
-from ema_model.comparison.events import Event, events
 from ema_model.comparison.explain import (
     Explanation,
     Order,
@@ -22,6 +21,7 @@ from ema_model.comparison.explain import (
     without_spikes,
 )
 from ema_model.comparison.explain import orders as orders_of
+from ema_model.comparison.regions import Event, events
 from ema_model.comparison.residuals import Residuals, residuals_of
 from ema_model.comparison.verdict import ORDER_OF_PRIMARY, lasting, most_of_floor
 from ema_model.estimation.floor import silent

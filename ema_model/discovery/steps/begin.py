@@ -9,7 +9,7 @@ from ema_model.actuator import Actuator
 from ema_model.actuator.file import check_represents
 from ema_model.comparison.compare import weights_of
 from ema_model.comparison.loop_lag import other_controller
-from ema_model.comparison.sentences import OPEN_LOOP
+from ema_model.comparison.residuals import OPEN_LOOP
 from ema_model.discovery.candidates.refit import settings_in, tried
 from ema_model.discovery.criteria import FAR
 from ema_model.discovery.observed.repeatability import by_inverse_dynamics, is_lost, with_divergence

@@ -44,7 +44,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def documents() -> tuple[type, ...]:
     """What --json holds: of recordings, and of units beside each other."""
-    from ema_model.comparison.summary import ComparisonJson
+    from ema_model.comparison.result import ComparisonJson
     from ema_model.units.result import UnitsComparedJson
 
     return (ComparisonJson, UnitsComparedJson)

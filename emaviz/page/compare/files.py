@@ -15,7 +15,7 @@ from ema_model.recordings.columns import WITHOUT_DELAY
 from ema_model.recordings.formats.text_layout import ENCODINGS, Hints
 from ema_model.recordings.health import Finding, Health
 from ema_model.text import COLOURS
-from emaviz.page.page import Page
+from emaviz.page.workspaces import Page
 from emaviz.server.viser_private import selector_of
 from emaviz.session.compare import Comparing
 from emaviz.session.files import Opened

@@ -12,9 +12,8 @@ import plotly.graph_objects as go
 import viser
 
 from ema_model.actuator import Actuator
-from ema_model.comparison.regions import worst_moment
-from ema_model.comparison.result import Compared, Comparison, Region
-from ema_model.comparison.words import details, errors, errors_by_recording, of_floor
+from ema_model.comparison.regions import Region, worst_moment
+from ema_model.comparison.result import Compared, Comparison, details, errors, errors_by_recording, of_floor
 from ema_model.errors import InputError
 from ema_model.estimation.calibrate import calibration_table
 from ema_model.faults import HEALTHY
@@ -26,10 +25,10 @@ from emaviz.figures.theme import why_missing
 from emaviz.page.compare import WORKSPACE
 from emaviz.page.compare.files import RawLines
 from emaviz.page.docked import ALL_COLUMNS, COLUMNS, NEXT_COLUMN, PLOTS_EARLY, ROOM
-from emaviz.page.page import Page
 from emaviz.page.panel import Cleared
 from emaviz.page.playback import PlaybackStrip
 from emaviz.page.style import IN_PAIRS
+from emaviz.page.workspaces import Page
 from emaviz.scene.playback import Motion, motion
 from emaviz.server.viser_private import selector_of
 from emaviz.session.files import Opened

@@ -21,10 +21,10 @@ from ema_model.text import COLOURS
 from emaviz.page.compare import WORKSPACE
 from emaviz.page.compare.files import MappingStep, RawLines, health_card, recordings_list
 from emaviz.page.compare.result import ResultPanel
-from emaviz.page.page import Page
 from emaviz.page.panel import RECORD, REPORT, JobLine, KeepButtons, Lead, Leads
 from emaviz.page.style import LONG_LABELS
 from emaviz.page.tab import Shared, Standing, Tab
+from emaviz.page.workspaces import Page
 from emaviz.recording.viewer import ViewerHost
 from emaviz.server.uploads import Uploads
 from emaviz.session.compare import COMPARABLE, LAY_OUT, MAP, OPEN, Comparing

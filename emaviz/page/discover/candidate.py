@@ -26,7 +26,7 @@ from ema_model.quantities.numbers import number as shown
 from ema_model.quantities.titles import in_sentence
 from ema_model.text import COLOURS
 from emaviz.figures import discovery
-from emaviz.page.page import Page
+from emaviz.page.workspaces import Page
 from emaviz.session.discover.discovering import Discovering, Preview, Typed, typed
 from emaviz.session.settings import number as setting_number
 from emaviz.text.html import BOX, Html, add_html, boxed, html, joined, mathml, note, unescaped

@@ -33,9 +33,9 @@ from emaviz.figures.discovery import equation
 from emaviz.page.discover import WORKSPACE
 from emaviz.page.discover.candidate import CONFIG, EffectView
 from emaviz.page.docked import COLUMNS, NEXT_COLUMN
-from emaviz.page.page import Page
 from emaviz.page.panel import Cleared
 from emaviz.page.playback import PlaybackStrip
+from emaviz.page.workspaces import Page
 from emaviz.scene.playback import motion
 from emaviz.session.discover import source
 from emaviz.session.discover.discovering import Discovering

@@ -22,9 +22,9 @@ from emaviz.page.discover import WORKSPACE, candidate
 from emaviz.page.discover.candidate import OwnEffect
 from emaviz.page.discover.result import DiscoveryPanel
 from emaviz.page.explore.tab import ExploreTab, take_experiment
-from emaviz.page.page import Page
 from emaviz.page.panel import JobLine, KeepButtons, Keeps, Lead, Leads
 from emaviz.page.tab import Shared, Standing, Tab
+from emaviz.page.workspaces import Page
 from emaviz.recording.viewer import ViewerHost
 from emaviz.server.uploads import Uploads
 from emaviz.server.viser_private import id_of

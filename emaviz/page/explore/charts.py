@@ -17,9 +17,9 @@ from emaviz.figures import runs
 from emaviz.figures.identification import LiveFan
 from emaviz.figures.runs import PHASE_SIGNALS, LivePhases, LiveSignals, differences, metrics, run_metrics_table
 from emaviz.page.explore import METRICS, PHASES, WORKSPACE
-from emaviz.page.page import Page
 from emaviz.page.playback import PlaybackStrip
 from emaviz.page.style import TIME_CHARTS, WIDE_MODAL, play_head
+from emaviz.page.workspaces import Page
 from emaviz.scene.playback import FIRST
 from emaviz.server.safe_server import SCENES
 from emaviz.session.data_folder import DataFolder

@@ -29,10 +29,10 @@ from ema_model.simulation.run import SHAPES
 from ema_model.text import COLOURS
 from emaviz.page.explore import WORKSPACE
 from emaviz.page.explore.charts import ChartsPanel, ExportControls
-from emaviz.page.page import Page
 from emaviz.page.panel import JobLine
 from emaviz.page.style import LONG_LABELS
 from emaviz.page.tab import Shared, Tab
+from emaviz.page.workspaces import Page
 from emaviz.session.discover.source import Sealing
 from emaviz.session.saved import recovered
 from emaviz.session.session import Simulation

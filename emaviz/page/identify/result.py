@@ -18,10 +18,10 @@ from emaviz.figures import identification
 from emaviz.figures.identification import LiveConvergence, LiveFit, Row, colour, fault_bars, table
 from emaviz.page.docked import COLUMNS, NEXT_COLUMN
 from emaviz.page.identify import WORKSPACE
-from emaviz.page.page import Page
 from emaviz.page.panel import JobLine
 from emaviz.page.playback import PlaybackStrip
 from emaviz.page.tab import Standing
+from emaviz.page.workspaces import Page
 from emaviz.scene.playback import PLAYED, motion
 from emaviz.session.identify import Frame, Landscapes, Race, Track, ends
 from emaviz.session.worker import Worker

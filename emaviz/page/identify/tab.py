@@ -18,11 +18,11 @@ from emaviz.figures.identification import Row, named
 from emaviz.page.explore.tab import ExploreTab, take_separating
 from emaviz.page.identify import WORKSPACE
 from emaviz.page.identify.result import IdentifyResult
-from emaviz.page.page import Page
 from emaviz.page.panel import JobLine, recording_link
 from emaviz.page.runs import RunsTab
 from emaviz.page.style import IN_PAIRS
 from emaviz.page.tab import Shared, Standing, Tab
+from emaviz.page.workspaces import Page
 from emaviz.recording.viewer import ViewerHost
 from emaviz.session.compare import Comparing
 from emaviz.session.discover.discovering import Discovering

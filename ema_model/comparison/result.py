@@ -156,7 +156,7 @@ def document_of(result: Comparison) -> Document:
 def errors(result: Comparison) -> Table:
     """Of each signal, over all recordings that were fitted."""
     axes = result.actuator.axes
-    return _words_errors(
+    return _error_table(
         "signal", result, [(of_signal(name, axes).title, name, one, "") for name, one in result.signals.items()]
     )
 
@@ -166,10 +166,10 @@ def errors_by_recording(result: Comparison, signal: str) -> Table | None:
     every = [(one, "") for one in result.recordings] + [(one, ", held out") for one in result.holdout]
     known = [(one.name, signal, one.errors[signal], how) for one, how in every if signal in one.errors]
     title = in_sentence(of_signal(signal, result.actuator.axes).title)
-    return _words_errors(f"recording, {title}", result, known) if len(known) > 1 else None
+    return _error_table(f"recording, {title}", result, known) if len(known) > 1 else None
 
 
-def _words_errors(title: str, result: Comparison, of: Sequence[tuple[str, str, SignalError, str]]) -> Table:
+def _error_table(title: str, result: Comparison, of: Sequence[tuple[str, str, SignalError, str]]) -> Table:
     """of: by row its name, the signal, its error, and what else is to be said."""
     rows, units, severities = [], [], []
     for name, signal, error, said in of:
@@ -459,7 +459,7 @@ def as_dict(comparison: Comparison) -> ComparisonJson:
         "events": [event_dict(one) for one in comparison.events],
         "simulation": simulation_dict(comparison.simulation),
         "recordings": [_compared(one) for one in comparison.recordings],
-        "holdout": [{"name": one.name, "signals": _summary_errors(one)} for one in comparison.holdout],
+        "holdout": [{"name": one.name, "signals": _errors_of(one)} for one in comparison.holdout],
     }
     return plain(document)
 
@@ -481,11 +481,11 @@ def _compared(one: Compared) -> ComparedJson:
         "name": one.name,
         "notes": list(one.measurement.notes),
         "health": one.health.as_dict(),
-        "signals": _summary_errors(one),
+        "signals": _errors_of(one),
     }
 
 
-def _summary_errors(one: Compared) -> dict[str, SignalErrorJson]:
+def _errors_of(one: Compared) -> dict[str, SignalErrorJson]:
     return {name: _error(error) for name, error in one.errors.items()}
 
 

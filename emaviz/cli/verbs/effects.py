@@ -7,7 +7,6 @@ import textwrap
 from dataclasses import asdict
 from typing import TYPE_CHECKING, cast
 
-from ema_model.quantities.axes import Axes
 from emaviz.cli import options
 from emaviz.cli.options import add_json, effect_name
 
@@ -105,6 +104,8 @@ def explain(effect: Effect) -> str:
 
 def _on_a_linear_axis(parameter: Parameter) -> str:
     """What it is called where the side that it sits at is linear, and its range there."""
+    from ema_model.quantities.axes import Axes
+
     there = parameter.on(Axes("linear", "linear"))
     if there.unit == parameter.unit:
         return ""

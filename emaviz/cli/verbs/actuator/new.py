@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING, Any
 
 from ema_model.errors import InputError, quoted
 from ema_model.members import stated_in
-from ema_model.quantities.axes import KINDS as AXES
 from emaviz.cli import options
 from emaviz.cli.options import FINITE, SAMPLE_RATE
 
@@ -25,12 +24,12 @@ _TEXTS = ("expression", "variable", "modulator")  # of a user's effect
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """The kinds, the values that are known, effects, and how recordings are read."""
-    kinds = stated_in("ema_model.actuator.keys", "KINDS")
+    kinds, axes = stated_in("ema_model.actuator.keys", "KINDS"), stated_in("ema_model.quantities.axes", "KINDS")
     parser.add_argument("file", type=options.SAVED_ACTUATOR, metavar="FILE.toml", help="the file to write")
     parser.add_argument("--name", help="what the actuator is called; without it, the file's name")
     parser.add_argument("--description", default="", help="a sentence about it")
-    parser.add_argument("--motor", choices=AXES, help="whether the motor turns; rotary without it")
-    parser.add_argument("--user", choices=AXES, help="whether what it moves turns or slides; rotary without it")
+    parser.add_argument("--motor", choices=axes, help="whether the motor turns; rotary without it")
+    parser.add_argument("--user", choices=axes, help="whether what it moves turns or slides; rotary without it")
     parser.add_argument("--gear", metavar="RATIO", help="user's motion per motor's: 0.002, 1/500 or 500:1")
     parser.add_argument("--lead-mm", type=FINITE, metavar="mm", help="of a screw, per turn of the motor")
     parser.add_argument("--controller", choices=tuple(kinds["controller"]), help="unknown: inverse dynamics")
@@ -130,7 +129,7 @@ def _document(arguments: argparse.Namespace) -> dict[str, Any]:
     """The tables of a file, with the names that files have."""
     document: dict[str, Any] = {"name": arguments.name or Path(arguments.file).stem}
     document["description"] = arguments.description
-    document["axes"] = {side: getattr(arguments, side) or AXES[0] for side in ("motor", "user")}
+    document["axes"] = {side: getattr(arguments, side) or "rotary" for side in ("motor", "user")}
     for text in arguments.settings:
         path, separator, value = text.partition("=")
         section, dot, name = path.strip().partition(".")

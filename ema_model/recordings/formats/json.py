@@ -43,7 +43,7 @@ def opened(path: str, most_bytes: int) -> Iterator[Log]:
         raise NoLog("it is nested too deeply") from None
     title = ""
     if is_one(document):
-        title, document = title(document), with_units(document)
+        title, document = servo_title(document), with_units(document)
     found = _Found()
     found.walk(document, ())
     channels, aside = in_columns(found.channels)
@@ -298,7 +298,7 @@ def _duties(loads: list[Any], limit: int) -> list[float]:
     return [count / limit for count in counts] if all(abs(count) <= limit for count in counts) else []
 
 
-def title(document: dict[str, Any]) -> str:
+def servo_title(document: dict[str, Any]) -> str:
     """What tells one such log from another: "xl330 kp400 sin_sin"."""
     parts = (document["motor"], f"kp{document['kp']}", document.get("trajectory", ""))
     return " ".join(str(part) for part in parts)[:100]

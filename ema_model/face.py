@@ -40,9 +40,8 @@ from ema_model.recordings.measurement import Sensors
 from ema_model.recordings.recording_set import long_enough
 from ema_model.simulation import plant
 from ema_model.simulation.run import Run
-from ema_model.tracking import flights as flights_tracking
 from ema_model.tracking import track as tracking
-from ema_model.tracking.flights import identified
+from ema_model.tracking.flights import check_enough, check_order, flights_in, identified
 from ema_model.tracking.result import Tracked
 from ema_model.units.compare import compare_units as compared_units
 from ema_model.units.result import UnitsCompared
@@ -388,13 +387,9 @@ def track(
     """
     actuator = actuator or load_actuator()
     tracking.check_thresholds(thresholds or {})
-    several = (
-        flights_tracking.flights_in(Path(of))
-        if isinstance(of, str | os.PathLike) and Path(of).is_dir()
-        else _several(of)
-    )
-    flights_tracking.check_order([Path(one) for one in several if not isinstance(one, Measurement)])
-    flights_tracking.check_enough(several, "em.track")
+    several = flights_in(Path(of)) if isinstance(of, str | os.PathLike) and Path(of).is_dir() else _several(of)
+    check_order([Path(one) for one in several if not isinstance(one, Measurement)])
+    check_enough(several, "em.track")
     flights = []
     for number, flight in _long_enough(several, actuator):
         if on_progress is not None:

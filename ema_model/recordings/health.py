@@ -15,7 +15,7 @@ from ema_model.files.opened import listed, shown
 from ema_model.quantities.axes import SIGNALS
 from ema_model.quantities.numbers import amount
 from ema_model.quantities.titles import in_sentence
-from ema_model.recordings import noise as noise_recordings
+from ema_model.recordings import noise as estimates
 from ema_model.recordings.columns import MappedColumn
 from ema_model.recordings.measurement import PHASES, Measurement
 from ema_model.recordings.noise import clock_drift, speed_lag
@@ -93,13 +93,13 @@ def sensors(measurement: Measurement) -> Iterator[Finding]:
                 "constant", "note", f"{signal.title} is constant, {amount(values[0], signal.unit)}.", {}, name
             )
             continue
-        blocks = noise_recordings.sample_blocks(values, measurement.runs)
-        step = noise_recordings.quantisation_step(blocks)
+        blocks = estimates.sample_blocks(values, measurement.runs)
+        step = estimates.quantisation_step(blocks)
         if step:
             coarse = step > 0.05 * spread
             sentence = f"{signal.title} comes in steps of {amount(step, signal.unit)}."
             yield Finding("quantisation", "note" if coarse else "good", sentence, {"step": step}, name)
-        noise = noise_recordings.noise_rms(blocks)
+        noise = estimates.noise_rms(blocks)
         if measurement.is_map or not np.isfinite(noise):
             continue
         if noise < step / np.sqrt(12.0):
@@ -122,8 +122,8 @@ def saturation(measurement: Measurement, limit: float | None) -> Iterator[Findin
         severity = "good" if share < 0.001 else "note" if share < 0.1 else "warning"
         yield Finding("saturation", severity, sentence, {"share": share, "limit_A": limit}, "current_A")
         return
-    noise = noise_recordings.noise_rms(noise_recordings.sample_blocks(values, measurement.runs))
-    level, share = noise_recordings.flat_tops(values, noise)
+    noise = estimates.noise_rms(estimates.sample_blocks(values, measurement.runs))
+    level, share = estimates.flat_tops(values, noise)
     if share:
         sentence = f"The current seems cut off at {amount(level, 'A')}, for {100.0 * share:.3g} % of the time."
         yield Finding("saturation", "note", sentence, {"share": share, "limit_A": level}, "current_A")
@@ -143,7 +143,7 @@ def delay(measurement: Measurement) -> Iterator[Finding]:
         run = max(measurement.runs, key=lambda run: run.stop - run.start)
         if run.stop - run.start < 32:
             continue
-        found, likeness = noise_recordings.delay_s(
+        found, likeness = estimates.delay_s(
             measurement[command][run], measurement[response][run], measurement.time_s[run]
         )
         title = in_sentence(SIGNALS[response].title)
@@ -161,7 +161,7 @@ def delay(measurement: Measurement) -> Iterator[Finding]:
 
 def signs(measurement: Measurement) -> Iterator[Finding]:
     """Whether speed is the position's derivative, in sign and size, and user and motor turn the same way."""
-    edges = noise_recordings.window_edges(measurement.runs)
+    edges = estimates.window_edges(measurement.runs)
     for kind, rate in (("rad", "rad_s"), ("m", "m_s")):
         motor, user, speed = f"motor_position_{kind}", f"user_position_{kind}", f"motor_speed_{rate}"
         position = motor if motor in measurement else user
@@ -174,11 +174,11 @@ def signs(measurement: Measurement) -> Iterator[Finding]:
 def _speed_sign(
     measurement: Measurement, position: str, speed: str, edges: list[NDArray[np.intp]]
 ) -> Iterator[Finding]:
-    moved = np.concatenate([noise_recordings.changes_over(measurement[position], cut) for cut in edges])
-    travelled = noise_recordings.integrated(measurement[speed], measurement.time_s)
-    expected = np.concatenate([noise_recordings.changes_over(travelled, cut) for cut in edges])
+    moved = np.concatenate([estimates.changes_over(measurement[position], cut) for cut in edges])
+    travelled = estimates.integrated(measurement[speed], measurement.time_s)
+    expected = np.concatenate([estimates.changes_over(travelled, cut) for cut in edges])
     # The speed over the position's derivative, so that a speed in rpm reads 9.55.
-    slope = noise_recordings.slope(expected, moved)
+    slope = estimates.slope(expected, moved)
     title = in_sentence(SIGNALS[position].title)
     values = {"ratio": slope.ratio, "correlation": slope.correlation}
     if not abs(slope.correlation) > 0.5:
@@ -201,10 +201,9 @@ def _speed_sign(
 
 def _gear(measurement: Measurement, motor: str, user: str, edges: list[NDArray[np.intp]]) -> Iterator[Finding]:
     turned, moved = (
-        np.concatenate([noise_recordings.changes_over(measurement[name], cut) for cut in edges])
-        for name in (motor, user)
+        np.concatenate([estimates.changes_over(measurement[name], cut) for cut in edges]) for name in (motor, user)
     )
-    slope = noise_recordings.slope(turned, moved)
+    slope = estimates.slope(turned, moved)
     if not abs(slope.correlation) > 0.5:
         return
     way = "the same way" if slope.ratio > 0.0 else "against each other"
@@ -222,10 +221,7 @@ def phases(measurement: Measurement, pole_pairs: float | None) -> Iterator[Findi
     left = float(np.sqrt(np.mean(np.sum(currents, axis=0) ** 2)))
     if rms > 0.0:
         # The sensors' own noise does not cancel.
-        noise = [
-            noise_recordings.noise_rms(noise_recordings.sample_blocks(current, measurement.runs))
-            for current in currents
-        ]
+        noise = [estimates.noise_rms(estimates.sample_blocks(current, measurement.runs)) for current in currents]
         noisy = float(np.nan_to_num(np.linalg.norm(noise)))
         excess = max(0.0, left**2 - (1.2 * noisy) ** 2) ** 0.5
         severity = "good" if excess < 0.05 * rms else "note" if excess < 0.3 * rms else "warning"
@@ -235,7 +231,7 @@ def phases(measurement: Measurement, pole_pairs: float | None) -> Iterator[Findi
     if "motor_position_rad" not in measurement:
         return
     angle = measurement["motor_position_rad"]
-    pairs, forward, backward, offset = noise_recordings.rotation_order(currents, angle, pole_pairs)
+    pairs, forward, backward, offset = estimates.rotation_order(currents, angle, pole_pairs)
     values = {"pole_pairs": pairs, "a_b_c": forward, "a_c_b": backward, "rotor_offset_rad": offset}
     likeness = max(forward, backward)
     if not likeness > 0.3 or abs(forward - backward) < 0.1 * likeness or np.ptp(angle) * pairs < np.pi:
@@ -256,11 +252,11 @@ def standstill(measurement: Measurement) -> Iterator[Finding]:
     """How much of the time nothing moves: below a hundredth of the fast speed over windows of a thousandth."""
     names = ("motor_position_rad", "user_position_rad", "motor_position_m", "user_position_m")
     name = next((name for name in names if name in measurement), None)
-    edges = noise_recordings.window_edges(measurement.runs)
+    edges = estimates.window_edges(measurement.runs)
     if name is None or not edges:
         return
-    moved = np.concatenate([np.abs(noise_recordings.changes_over(measurement[name], cut)) for cut in edges])
-    lasted = np.concatenate([noise_recordings.changes_over(measurement.time_s, cut) for cut in edges])
+    moved = np.concatenate([np.abs(estimates.changes_over(measurement[name], cut)) for cut in edges])
+    lasted = np.concatenate([estimates.changes_over(measurement.time_s, cut) for cut in edges])
     speed = moved / lasted
     fast = float(np.quantile(speed, 0.98))
     share = float(np.sum(lasted[speed <= 0.01 * fast]) / np.sum(lasted))

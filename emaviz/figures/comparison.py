@@ -11,9 +11,9 @@ from ema_model.comparison.regions import Region
 from ema_model.comparison.result import Comparison
 from ema_model.errors import InputError
 from ema_model.estimation.floor import BAND_SIGMAS
-from ema_model.quantities import axes as axes_quantities
 from ema_model.quantities import variables
 from ema_model.quantities.axes import ROTARY, Axes, of_signal
+from ema_model.quantities.axes import of_residual as residual_of_signal
 from ema_model.quantities.numbers import Quantity
 from ema_model.quantities.variables import MODULATORS, variable_title
 from ema_model.recordings import SIGNALS, ColumnMapping, Measurement, apply_mapping
@@ -659,13 +659,13 @@ def model_pair(
 
 def quantity_of_signal(comparison: Comparison, name: str) -> Quantity:
     """A signal, in its own unit."""
-    return axes_quantities.of_signal(name, comparison.actuator.axes)
+    return of_signal(name, comparison.actuator.axes)
 
 
 def of_residual(comparison: Comparison, name: str, *, as_torque: bool = False) -> Quantity:
     """What is left of a signal; as_torque: the current's is told as the motor's torque, where that is known."""
     constant = comparison.residuals.torque_constant if as_torque else None
-    return axes_quantities.of_residual(name, comparison.actuator.axes, constant)
+    return residual_of_signal(name, comparison.actuator.axes, constant)
 
 
 def of_variable(comparison: Comparison, variable: str) -> Quantity:

@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from ema_model.actuator import Actuator
 from ema_model.actuator.naming import on_axes
 from ema_model.estimation.floor import CORRELATED_S, Floor, local_rms
+from ema_model.estimation.information import Combination, covariance_of, known_together, measured
 from ema_model.estimation.least_squares import descended
 from ema_model.estimation.problem import Problem
 from ema_model.estimation.unknowns import (
@@ -316,11 +317,11 @@ def calibrate(
     fit = search.solve(start)
     x = fit.x
     chi2 = fit.chi2
-    root = np.linalg.inv(np.linalg.qr(fit.jacobian, mode="r"))  # JᵀJ itself rounds the prior away beside a fine floor
     scale = max(1.0, chi2)
     if chi2 > _MISFIT:  # errors of a wrong model last
         scale *= max(1.0, CORRELATED_S / min(one.block_s for one in floors))
-    covariance = root @ root.T * scale
+    jacobian = measured(problem, x, fit.jacobian, scale)
+    covariance = covariance_of(jacobian) * scale
     fitted_k = problem.k(x)
     actuator = replace(model.actuator.varied(problem.parameters(x)), faults=named(fitted_k))
     found = calibrated(problem, x, covariance)
@@ -337,8 +338,8 @@ def calibrate(
         covariance_scale=scale,
         signals=shown,
         before=before,
-        sensitivities=by_window(problem, fit.jacobian, weighted=False),
-        weighted_sensitivities=by_window(problem, fit.jacobian, weighted=True),
+        sensitivities=by_window(problem, jacobian, weighted=False),
+        weighted_sensitivities=by_window(problem, jacobian, weighted=True),
         x=x,
         room=(problem.low - x, problem.high - x),
         evaluations=search.evaluations,

@@ -13,6 +13,7 @@ from ema_model.comparison.events import Event
 from ema_model.comparison.free_simulation import Simulated, without
 from ema_model.comparison.result import COMPARISON_VERDICTS, Compared, Comparison, Region, SignalError
 from ema_model.estimation import Calibrated, Calibration
+from ema_model.estimation.calibrate import product_in_words
 from ema_model.quantities.axes import Axes
 from ema_model.quantities.numbers import IntervalJson
 from ema_model.quantities.signals import SIGNALS
@@ -59,10 +60,22 @@ class ParameterJson(TypedDict):
 
     value: Annotated[float, Meta(description="what was found")]
     initial: Annotated[float, Meta(description="what the actuator's file says")]
-    interval90: Annotated[IntervalJson, Meta(description="the ends of the 90 % interval about value")]
+    interval90: Annotated[
+        IntervalJson | None, Meta(description="the ends of the 90 % interval about value; null: see from_file")
+    ]
+    from_file: Annotated[bool, Meta(description="whether the recordings tell nothing beyond the file's tolerance")]
     unit: Annotated[str, Meta(description="of value, initial and interval90; empty for a ratio")]
     z: Annotated[float, Meta(description="value − initial, in σ of the file's tolerance")]
     at_bound: Annotated[bool, Meta(description="whether the fit ended at the end of what is allowed")]
+
+
+class CombinationJson(TypedDict):
+    """Parameters that are known only together, as the product of their powers."""
+
+    members: Annotated[dict[str, int], Meta(description="powers by the names in the actuator's file")]
+    combination: Annotated[str, Meta(description="the product in words")]
+    value: Annotated[float, Meta(description="of the product, in SI units")]
+    interval90: Annotated[IntervalJson, Meta(description="the ends of the 90 % interval about value")]
 
 
 class CalibrationJson(TypedDict):
@@ -164,6 +177,7 @@ class ComparisonJson(TypedDict):
     signals: Annotated[dict[str, SignalErrorJson], Meta(description="errors over all fitted recordings, by signal")]
     primary: Annotated[str, Meta(description="the signal whose residual is explained")]
     calibration: Annotated[CalibrationJson | None, Meta(description="null where none was asked for")]
+    identifiable: Annotated[list[CombinationJson], Meta(description="what the recordings tell only together")]
     explained_by: Annotated[list[ExplanationJson], Meta(description="what goes with the primary residual, best first")]
     orders: Annotated[list[OrderJson], Meta(description="of the primary residual, strongest first; significant ones")]
     worst_regions: Annotated[list[RegionJson], Meta(description="where the model fails most, worst first")]
@@ -190,6 +204,7 @@ def as_dict(comparison: Comparison) -> ComparisonJson:
         "calibration": None
         if comparison.calibration is None
         else calibration_dict(comparison.calibration, comparison.actuator.axes),
+        "identifiable": combinations(comparison.calibration, comparison.actuator.axes),
         "explained_by": [
             {
                 "variable": one.variable,
@@ -294,12 +309,26 @@ def calibration_dict(calibration: Calibration, axes: Axes) -> CalibrationJson:
     }
 
 
+def combinations(calibration: Calibration | None, axes: Axes) -> list[CombinationJson]:
+    """What a calibration knows only together, by the names in files."""
+    return [
+        {
+            "members": {on_axes(name, axes).path: power for name, power in one.powers.items()},
+            "combination": product_in_words(one, axes),
+            "value": one.value,
+            "interval90": list(one.interval90),
+        }
+        for one in (() if calibration is None else calibration.identifiable)
+    ]
+
+
 def parameter_dict(one: Calibrated) -> ParameterJson:
     """One calibrated parameter."""
     return {
         "value": one.value,
         "initial": one.initial,
-        "interval90": list(one.interval90),
+        "interval90": None if one.from_file else list(one.interval90),
+        "from_file": one.from_file,
         "unit": one.unit,
         "z": one.z,
         "at_bound": one.at_bound,

@@ -10,7 +10,7 @@ import numpy as np
 from ema_model.comparison.free_simulation import Score, Simulated, without
 from ema_model.comparison.result import Compared, Comparison, Region, SignalError
 from ema_model.comparison.sentences import dependence
-from ema_model.estimation.calibrate import calibration_table
+from ema_model.estimation.calibrate import calibration_table, together
 from ema_model.quantities.axes import ROTARY, Axes
 from ema_model.quantities.numbers import Quantity, number
 from ema_model.quantities.shown import of_residual, of_signal
@@ -161,7 +161,7 @@ def _recordings(result: Comparison) -> Iterator[Table | Lines]:
         yield Lines([held_out(one) for one in result.holdout])
 
 
-def _why(result: Comparison) -> Iterator[Table | Lines]:
+def _why(result: Comparison) -> Iterator[Table | Lines | Note]:
     axes = result.actuator.axes
     if result.explained_by:
         rows, remarks = [], []
@@ -178,3 +178,4 @@ def _why(result: Comparison) -> Iterator[Table | Lines]:
         yield Lines([f"orders per revolution: {found}"])
     if result.calibration is not None and (table := calibration_table(result.calibration, axes)) is not None:
         yield table
+        yield from map(Note, together(result.calibration, axes))

@@ -30,7 +30,7 @@ _GROWN = 1.2  # times as wide open, from which on a direction is measured again
 
 
 def covariance_of(jacobian: Array) -> Array:
-    """(JᵀJ)⁻¹ of a Jacobian (rows, unknowns) of full rank, without JᵀJ, which rounds a prior away beside fine floors."""
+    """(JᵀJ)⁻¹ of a Jacobian (rows, unknowns) of full rank; JᵀJ itself would round a prior away beside fine floors."""
     root = np.linalg.inv(np.linalg.qr(jacobian, mode="r"))
     return root @ root.T
 
@@ -64,10 +64,14 @@ def measured(problem: Problem, x: Array, jacobian: Array, scale: float = 1.0) ->
 
 # --- what is known only together: products of powers that recordings tell, though none of their factors ---------------
 
-_OPEN = 0.5  # of its prior's σ, that a factor must be left open by
+_BY_OTHERS = 3.0  # how many times wider open a factor must be than if all others were known
 _KNOWN = 0.2  # of what its factors leave each on its own, that a product may be left open by
-_POWERS = (1, -1, 2, -2)
-_MOST_FACTORS, _MOST_OPEN = 4, 8
+_POWERS = {
+    2: (1, -1, 2, -2),
+    3: (1, -1),
+    4: (1, -1),
+}  # by the number of factors: more of them bend any sum to a product
+_MOST_OPEN = 8
 
 
 @dataclass(frozen=True)
@@ -92,14 +96,15 @@ def known_together(names: Sequence[str], values: Array, sigmas: Array, covarianc
     """
     shares = sigmas / values
     logarithms = covariance * np.outer(shares, shares)
-    left = np.sqrt(np.diag(covariance))
-    open_ones = sorted((i for i in range(len(names)) if left[i] > _OPEN), key=lambda i: -left[i])[:_MOST_OPEN]
+    taken_up = np.sqrt(np.diag(covariance) * np.diag(np.linalg.inv(covariance)))
+    order = np.argsort(-taken_up, kind="stable")[:_MOST_OPEN]
+    open_ones = sorted(int(i) for i in order if taken_up[i] > _BY_OTHERS)
     found: list[tuple[Array, Combination]] = []
-    for factors in range(2, _MOST_FACTORS + 1):
+    for factors in _POWERS:
         seen = [
             one
-            for places in itertools.combinations(sorted(open_ones), factors)
-            for powers in itertools.product(_POWERS, repeat=factors)
+            for places in itertools.combinations(open_ones, factors)
+            for powers in itertools.product(_POWERS[factors], repeat=factors)
             if powers[0] > 0 and (one := _product(np.array(places), np.array(powers), logarithms)) is not None
         ]
         for relative, places, powers in sorted(seen, key=lambda one: (int(np.abs(one[2]).sum()), one[0])):

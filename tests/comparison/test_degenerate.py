@@ -19,7 +19,8 @@ from ema_model.identification.objective import Objective
 from ema_model.identification.run import identify
 from ema_model.models import ClosedLoop, InverseDynamics
 from ema_model.recordings import Measurement, SideFile
-from ema_model.simulation.run import Run, Sensors, simulate_monitor, simulate_reference
+from ema_model.simulation.run import Run, simulate_monitor, simulate_reference
+from ema_model.simulation.sensors import Sensors
 
 ACTUATOR = load_actuator()
 LOOSE = replace(ACTUATOR, controller=replace(ACTUATOR.controller, kind="unknown"))

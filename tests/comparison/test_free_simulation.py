@@ -14,7 +14,8 @@ from ema_model.discovery import as_dict as discovery_as_dict
 from ema_model.discovery import discover
 from ema_model.models.open_loop import free_motion
 from ema_model.recordings import Measurement
-from ema_model.simulation.run import Run, Sensors, simulate_reference
+from ema_model.simulation.run import Run, simulate_reference
+from ema_model.simulation.sensors import Sensors
 
 TRUE = {
     "motor.inertia_kgm2": 1.05e-4,

@@ -11,7 +11,8 @@ from scipy.signal import lfilter
 from ema_model.actuator import load_actuator
 from ema_model.commands import Command, Recorded, command
 from ema_model.recordings import Measurement
-from ema_model.simulation.run import Run, Sensors, simulate_reference
+from ema_model.simulation.run import Run, simulate_reference
+from ema_model.simulation.sensors import Sensors
 
 _STEP_S = 1e-5  # at which the run is known
 DURATION_S = 0.5

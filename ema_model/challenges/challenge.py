@@ -34,7 +34,7 @@ from ema_model.files.written import whole_file
 # A challenge as one file to hand on: NAME.challenge, a zip of its recordings, its story, its actuator, its seal.
 #
 # The seal is a digest over all other parts and a salt: a part that was changed is noticed, and what is hidden cannot
-# be guessed from it. The part that tells the answer is carried here unread; `truth.py` writes and reads it.
+# be guessed from it. The part that tells the answer is carried here unread.
 
 SUFFIX = ".challenge"
 SCHEMA = 1

@@ -16,7 +16,13 @@ from ema_model.comparison.explain import Explanation
 from ema_model.comparison.free_simulation import Score, Simulated, without
 from ema_model.comparison.regions import Event, Region
 from ema_model.comparison.residuals import Residuals, dependence
-from ema_model.estimation.calibrate import Calibrated, Calibration, calibration_table
+from ema_model.estimation.calibrate import (
+    Calibrated,
+    Calibration,
+    calibration_table,
+    product_in_words,
+    together,
+)
 from ema_model.quantities.axes import ROTARY, SIGNALS, Axes, of_residual, of_signal
 from ema_model.quantities.numbers import IntervalJson, Quantity, number
 from ema_model.quantities.titles import in_sentence
@@ -247,7 +253,7 @@ def _recordings(result: Comparison) -> Iterator[Table | Lines]:
         yield Lines([held_out(one) for one in result.holdout])
 
 
-def _why(result: Comparison) -> Iterator[Table | Lines]:
+def _why(result: Comparison) -> Iterator[Table | Lines | Note]:
     axes = result.actuator.axes
     if result.explained_by:
         rows, remarks = [], []
@@ -264,6 +270,7 @@ def _why(result: Comparison) -> Iterator[Table | Lines]:
         yield Lines([f"orders per revolution: {found}"])
     if result.calibration is not None and (table := calibration_table(result.calibration, axes)) is not None:
         yield table
+        yield from map(Note, together(result.calibration, axes))
 
 
 # --- a comparison in plain numbers, as `emaviz compare --json` writes it ----------------------------------------------
@@ -310,10 +317,22 @@ class ParameterJson(TypedDict):
 
     value: Annotated[float, Meta(description="what was found")]
     initial: Annotated[float, Meta(description="what the actuator's file says")]
-    interval90: Annotated[IntervalJson, Meta(description="the ends of the 90 % interval about value")]
+    interval90: Annotated[
+        IntervalJson | None, Meta(description="the ends of the 90 % interval about value; null: see from_file")
+    ]
+    from_file: Annotated[bool, Meta(description="whether the recordings tell nothing beyond the file's tolerance")]
     unit: Annotated[str, Meta(description="of value, initial and interval90; empty for a ratio")]
     z: Annotated[float, Meta(description="value − initial, in σ of the file's tolerance")]
     at_bound: Annotated[bool, Meta(description="whether the fit ended at the end of what is allowed")]
+
+
+class CombinationJson(TypedDict):
+    """Parameters that are known only together, as the product of their powers."""
+
+    members: Annotated[dict[str, int], Meta(description="powers by the names in the actuator's file")]
+    combination: Annotated[str, Meta(description="the product in words")]
+    value: Annotated[float, Meta(description="of the product, in SI units")]
+    interval90: Annotated[IntervalJson, Meta(description="the ends of the 90 % interval about value")]
 
 
 class CalibrationJson(TypedDict):
@@ -415,6 +434,7 @@ class ComparisonJson(TypedDict):
     signals: Annotated[dict[str, SignalErrorJson], Meta(description="errors over all fitted recordings, by signal")]
     primary: Annotated[str, Meta(description="the signal whose residual is explained")]
     calibration: Annotated[CalibrationJson | None, Meta(description="null where none was asked for")]
+    identifiable: Annotated[list[CombinationJson], Meta(description="what the recordings tell only together")]
     explained_by: Annotated[list[ExplanationJson], Meta(description="what goes with the primary residual, best first")]
     orders: Annotated[list[OrderJson], Meta(description="of the primary residual, strongest first; significant ones")]
     worst_regions: Annotated[list[RegionJson], Meta(description="where the model fails most, worst first")]
@@ -441,6 +461,7 @@ def as_dict(comparison: Comparison) -> ComparisonJson:
         "calibration": None
         if comparison.calibration is None
         else calibration_dict(comparison.calibration, comparison.actuator.axes),
+        "identifiable": combinations(comparison.calibration, comparison.actuator.axes),
         "explained_by": [
             {
                 "variable": one.variable,
@@ -545,12 +566,26 @@ def calibration_dict(calibration: Calibration, axes: Axes) -> CalibrationJson:
     }
 
 
+def combinations(calibration: Calibration | None, axes: Axes) -> list[CombinationJson]:
+    """What a calibration knows only together, by the names in files."""
+    return [
+        {
+            "members": {on_axes(name, axes).path: power for name, power in one.powers.items()},
+            "combination": product_in_words(one, axes),
+            "value": one.value,
+            "interval90": list(one.interval90),
+        }
+        for one in (() if calibration is None else calibration.identifiable)
+    ]
+
+
 def parameter_dict(one: Calibrated) -> ParameterJson:
     """One calibrated parameter."""
     return {
         "value": one.value,
         "initial": one.initial,
-        "interval90": list(one.interval90),
+        "interval90": None if one.from_file else list(one.interval90),
+        "from_file": one.from_file,
         "unit": one.unit,
         "z": one.z,
         "at_bound": one.at_bound,

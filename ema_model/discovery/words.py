@@ -20,10 +20,12 @@ from ema_model.comparison.loop_lag import BLAMED, LoopLag
 from ema_model.comparison.residuals import dependence
 from ema_model.comparison.result import (
     CalibrationJson,
+    CombinationJson,
     EventJson,
     ParameterJson,
     SimulatedJson,
     calibration_dict,
+    combinations,
     event_dict,
     free_simulation,
     parameter_dict,
@@ -39,6 +41,7 @@ from ema_model.effects import CATALOGUE, find
 from ema_model.effects.effect import FAMILIES
 from ema_model.errors import InputError
 from ema_model.estimation import Calibrated
+from ema_model.estimation.calibrate import together
 from ema_model.faults import BY_NAME, FAULTS, NAMES, cause_of, causes, vector
 from ema_model.quantities.axes import Axes, of_signal
 from ema_model.quantities.numbers import IntervalJson, Quantity, amount, number, with_uncertainty
@@ -660,6 +663,7 @@ class DiscoveryJson(TypedDict):
 
     verdict: Annotated[str, Meta(description=f"one of {', '.join(VERDICTS)}")]
     calibration: Annotated[CalibrationJson, Meta(description="of the last model")]
+    identifiable: Annotated[list[CombinationJson], Meta(description="what the recordings tell only together")]
     effects: Annotated[list[AddedJson], Meta(description="that are missing, in the order in which they were added")]
     ladder: Annotated[list[RungJson], Meta(description="the error after each change of the model")]
     simulation: Annotated[
@@ -694,6 +698,7 @@ def as_dict(found: Discovery) -> DiscoveryJson:
     document: DiscoveryJson = {
         "verdict": found.verdict,
         "calibration": calibration_dict(found.calibration, axes),
+        "identifiable": combinations(found.calibration, axes),
         "effects": [_added(one, axes) for one in found.effects],
         "ladder": [_rung(rung, axes, is_believable) for rung in found.ladder],
         "simulation": simulation_dict(found.simulation),
@@ -1065,6 +1070,7 @@ def document_of(found: Discovery) -> Document:
         [
             Lines([f"{verdict_name(found)}: {headline(found)}", *sentences(found)]),
             *(Note(warning) for warning in found.warnings),
+            *map(Note, together(found.calibration, found.actuator.axes)),
             *added(found),
             *(table for table in tables if table is not None),
             *([Lines(asked)] if asked else []),

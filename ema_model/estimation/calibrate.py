@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from ema_model.actuator import Actuator
 from ema_model.actuator.parameters import on_axes
 from ema_model.estimation.floor import CORRELATED_S, Floor, local_rms
+from ema_model.estimation.information import Combination, covariance_of, known_together, measured
 from ema_model.estimation.least_squares import descended
 from ema_model.estimation.problem import (
     ECCENTRICITY,
@@ -27,7 +28,7 @@ from ema_model.faults import NAMES, named
 from ema_model.models import Model
 from ema_model.models.model import Signals
 from ema_model.quantities.axes import Axes
-from ema_model.quantities.numbers import HALF_90, number
+from ema_model.quantities.numbers import HALF_90, number, with_uncertainty
 from ema_model.quantities.titles import in_sentence
 from ema_model.side_by_side import windows
 from ema_model.text import Severity, Table
@@ -182,8 +183,10 @@ def calibration_table(fit: Calibration, axes: Axes, among: Collection[str] | Non
     for path, one in fitted.items():
         low, high = (number(edge, 4) for edge in one.interval90)
         moved = f"{round(one.z, 2) + 0.0:+.2f}".replace("-", "−")
-        rows.append([_title(path, axes), number(one.initial, 4), number(one.value, 4), f"{low} … {high}", moved])
-        said = f"{'  at its bound' if one.at_bound else ''}{'  interval cut at its physical limit' if one.cut else ''}"
+        interval = "the file's" if one.from_file else f"{low} … {high}"
+        rows.append([_title(path, axes), number(one.initial, 4), number(one.value, 4), interval, moved])
+        cut = one.cut and not one.from_file
+        said = f"{'  at its bound' if one.at_bound else ''}{'  interval cut at its physical limit' if cut else ''}"
         remarks.append(f"{one.unit}{said}".strip())
     if not rows:
         return None
@@ -194,17 +197,46 @@ def calibration_table(fit: Calibration, axes: Axes, among: Collection[str] | Non
 
 
 def warnings(fit: Calibration, axes: Axes) -> list[str]:
-    """The parameters at their bounds, and those that are only known together."""
+    """The parameters at their bounds, and those that are only known together, as products where such are known."""
+    products = {name for one in fit.identifiable for name in one.powers}
     found = [
         f"{_title(path, axes)} stands at the bound of its tolerance: the model wants more than the file allows."
         for path, one in fit.parameters.items()
         if one.at_bound
     ]
-    return found + [
+    return [*found, *together(fit, axes)] + [
         f"{_title(a, axes)} and {in_sentence(_title(b, axes))} trade against each other here: "
         "only both together are known."
         for a, b in fit.confounded
+        if not {a, b} <= products
     ]
+
+
+def together(fit: Calibration, axes: Axes) -> list[str]:
+    """'Known only together: gain · torque constant / resistance = 0.0230 ± 0.0021. Record the current as well, …'"""
+    if not fit.identifiable:
+        return []
+    found = []
+    for one in fit.identifiable:
+        low, high = one.interval90
+        found.append(f"{product_in_words(one, axes)} = {with_uncertainty(one.value, 0.5 * (high - low), '')}")
+    silent = "current_A" not in {name for part in fit.weighted_sensitivities for name in part}
+    how = "Record the current as well, or measure one of them apart" if silent else "Measure one of them apart"
+    return [f"Known only together: {'; '.join(found)}. {how}."]
+
+
+def product_in_words(one: Combination, axes: Axes) -> str:
+    """'gain · torque constant / resistance²'"""
+    above, below = (
+        [
+            f"{in_sentence(_title(name, axes))}{'²' if abs(power) == 2 else ''}"
+            for name, power in one.powers.items()
+            if (power > 0) is over
+        ]
+        for over in (True, False)
+    )
+    divided = f" / {below[0]}" if len(below) == 1 else f" / ({' · '.join(below)})" if below else ""
+    return f"{' · '.join(above)}{divided}"
 
 
 def _title(path: str, axes: Axes) -> str:
@@ -213,6 +245,7 @@ def _title(path: str, axes: Axes) -> str:
 
 # --- fits the actuator's parameters to recordings: least squares with the tolerances as a prior -----------------------
 
+_OF_FILE = 0.9  # of the file's σ, that is left where the recordings tell nothing
 _OUTSIDE_Z = 2.99  # from which on a parameter stands at the edge of its tolerance
 _AS_IN_THE_FILE = 0.05  # σ, up to which a parameter is where it was
 _DRAWN = 192  # of the prior, from which further starts are taken
@@ -232,6 +265,7 @@ class Calibrated:
     at_bound: bool
     spread: float | None = None  # 1 σ of the value before its interval was cut; half the interval's own without it
     cut: bool = False  # whether the interval ends where the parameter's physics does
+    from_file: bool = False  # whether the recordings tell nothing beyond the file's tolerance, which its interval is
 
     @property
     def sigma(self) -> float:
@@ -260,6 +294,7 @@ class Calibration:
     room: tuple[Array, Array]  # (unknowns,) each, how far x may still go down and up, in σ
     evaluations: int
     confounded: tuple[tuple[str, str], ...]  # pairs that trade against each other
+    identifiable: tuple[Combination, ...]  # what is known only together, of parameters that are hardly known alone
     free: tuple[str, ...]
 
     def start_of(self, window: int | None) -> tuple[float, float, float]:
@@ -316,11 +351,11 @@ def calibrate(
     fit = search.solve(start)
     x = fit.x
     chi2 = fit.chi2
-    root = np.linalg.inv(np.linalg.qr(fit.jacobian, mode="r"))  # JᵀJ itself rounds the prior away beside a fine floor
     scale = max(1.0, chi2)
     if chi2 > _MISFIT:  # errors of a wrong model last
         scale *= max(1.0, CORRELATED_S / min(one.block_s for one in floors))
-    covariance = root @ root.T * scale
+    jacobian = measured(problem, x, fit.jacobian, scale)
+    covariance = covariance_of(jacobian) * scale
     fitted_k = problem.k(x)
     actuator = replace(model.actuator.varied(problem.parameters(x)), faults=named(fitted_k))
     found = calibrated(problem, x, covariance)
@@ -337,12 +372,13 @@ def calibrate(
         covariance_scale=scale,
         signals=shown,
         before=before,
-        sensitivities=by_window(problem, fit.jacobian, weighted=False),
-        weighted_sensitivities=by_window(problem, fit.jacobian, weighted=True),
+        sensitivities=by_window(problem, jacobian, weighted=False),
+        weighted_sensitivities=by_window(problem, jacobian, weighted=True),
         x=x,
         room=(problem.low - x, problem.high - x),
         evaluations=search.evaluations,
         confounded=_confounded(problem.unknowns, covariance),
+        identifiable=_products(problem, x, covariance),
         free=chosen,
     )
 
@@ -481,7 +517,8 @@ def calibrated(problem: Problem, x: Array, covariance: Array, most: float = 1.0)
         at_bound = driven_to_bound(u, float(x[i]))
         unit = on_axes(u.name, axes).unit
         ends, cut = within(value, half, physical_limits(u.name, problem.model.actuator))
-        found[u.name] = Calibrated(value, u.nominal, ends, unit, float(x[i]), at_bound, half / HALF_90, cut)
+        of_file = u.is_base and half > _OF_FILE * HALF_90 * u.sigma and not at_bound
+        found[u.name] = Calibrated(value, u.nominal, ends, unit, float(x[i]), at_bound, half / HALF_90, cut, of_file)
     return {**found, **_eccentricity(problem, x, covariance)} if "k6" in found else found
 
 
@@ -517,6 +554,15 @@ def _eccentricity(problem: Problem, x: Array, covariance: Array) -> dict[str, Ca
         ends, cut = within(float(k[i]), half, of)
         found[name] = Calibrated(float(k[i]), float(file[i]), ends, "", z, bool(at_bound), half / HALF_90, cut)
     return found
+
+
+def _products(problem: Problem, x: Array, covariance: Array) -> tuple[Combination, ...]:
+    at = [i for i, u in enumerate(problem.unknowns) if u.is_scale]
+    values = [(u.nominal + u.sigma * x[i], u.sigma) for i, u in enumerate(problem.unknowns) if u.is_scale]
+    if not at:
+        return ()
+    found, sigmas = np.array(values).T
+    return known_together([problem.unknowns[i].name for i in at], found, sigmas, covariance[np.ix_(at, at)])
 
 
 def _confounded(unknowns: Sequence[Unknown], covariance: NDArray[np.floating]) -> tuple[tuple[str, str], ...]:

@@ -347,8 +347,8 @@ class Problem:
         shown = self._errors(np.concatenate([points.reshape(-1, self.count), others]), window)
         errors = shown[: n * lanes].reshape(n, lanes, -1)
         here, below, above, there = np.split(errors, [1, 1 + both, 1 + 2 * both], axis=1)
-        slopes[:, sides] = (above - below) / self._distance(x, low, high)[:, sides, None]
-        slopes[:, side] = (there - here) / self._distance(x, x, far)[:, side, None]
+        slopes[:, sides] = (above - below) / self.distance(x, low, high)[:, sides, None]
+        slopes[:, side] = (there - here) / self.distance(x, x, far)[:, side, None]
         return errors[:, 0], shown[n * lanes :]
 
     def moved(self, x: Array, by: Array) -> Array:
@@ -358,7 +358,7 @@ class Problem:
         ratio = np.exp(np.clip(by * self._sigma / np.where(scales, values, 1.0), -_LARGEST_RATIO, _LARGEST_RATIO))
         return np.where(scales, (values * ratio - self._nominal) / self._sigma, x + by)
 
-    def _distance(self, x: Array, start: Array, end: Array) -> Array:
+    def distance(self, x: Array, start: Array, end: Array) -> Array:
         """From start to end, in σ, as a derivative at x has it: of scales the logarithm of their ratio."""
         values, of_start, of_end = (self._nominal + self._sigma * one for one in (x, start, end))
         logarithmic = self._scale & (values > 0.0) & (of_start > 0.0) & (of_end > 0.0)

@@ -27,7 +27,7 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False)
 class Flight:
-    """k̂ = k + common · u + e, the eccentricity as a vector in the places of k6 and k7 (see `estimation.unknowns`).
+    """k̂ = k + common · u + e, the eccentricity as a vector in the places of k6 and k7 (see `estimation.problem`).
 
     u are the unit's base parameters in σ of their tolerances: the same numbers in all its flights, so that they move
     no trend.  e is the flight's own: its sensors' noise, its start, the model's own error on its command.

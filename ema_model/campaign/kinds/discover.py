@@ -86,7 +86,9 @@ def _run(given: Given, settings: Settings, seed: int) -> dict[str, Any]:
         ),
         "outside": found["parameters_outside_tolerance"],
         "at_bound": [name for name, one in calibrated.items() if one["at_bound"]],
-        "calibrated": json.dumps({name: [one["value"], *one["interval90"]] for name, one in calibrated.items()}),
+        "calibrated": json.dumps(
+            {name: [one["value"], *(one["interval90"] or (None, None))] for name, one in calibrated.items()}
+        ),
         "controller_mismatch": found["controller_mismatch"],
         "transmission": None if found["transmission_seen"] is None else found["transmission_seen"]["cause"],
         "unknown": None if unknown is None else f"{unknown['variable']} × {unknown['modulator']}",

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from ema_model.discovery.evidence.counted import colour_of, signals_of
 from ema_model.estimation import Calibration
 from ema_model.estimation.calibrate import calibrated, problem_of
+from ema_model.estimation.information import covariance_of
 from ema_model.estimation.model_fit import Data, Fit, fit
 from ema_model.quantities.numbers import HALF_90
 
@@ -33,31 +34,26 @@ def with_intervals(data: Data, found: Fit) -> Calibration:
     """
     calibration = found.calibration
     jacobian = calibration.weighted_jacobian / np.sqrt(colour_of(data, found))[:, None]
-    covariance = covariance_of(jacobian)
+    covariance = covariance_of(_with_prior(jacobian))
     problem = problem_of(found.plant, data.floors, free=calibration.free, signals=data.signals)
     variance, most = np.diag(covariance), 1.0 if found.plant.simulates_commands else _OF_FILE
     by_file = np.sum(covariance**2, axis=1)  # of it, what the tolerances leave open
     wider = np.sqrt(np.maximum(1.0 + (most**2 - 1.0) * by_file / variance, _by_pieces(data, found) / variance))
     told = calibrated(problem, calibration.x, covariance * np.outer(wider, wider), most)
-    parameters = {
-        name: replace(one, interval90=told[name].interval90, spread=told[name].spread, cut=told[name].cut)
-        for name, one in calibration.parameters.items()
-    }
+    parameters = {name: replace(told[name], at_bound=one.at_bound) for name, one in calibration.parameters.items()}
     return replace(calibration, parameters=parameters).as_result
 
 
-def covariance_of(jacobian: Array) -> Array:
-    """(JᵀJ + 1)⁻¹, of unknowns in σ of their tolerances."""
-    # Orthogonal to the last digit: beside a fine floor JᵀJ itself rounds the prior away.
-    root = np.linalg.inv(np.linalg.qr(np.concatenate([jacobian, np.eye(jacobian.shape[1])]), mode="r"))
-    return root @ root.T
+def _with_prior(jacobian: Array) -> Array:
+    """Of unknowns in σ of their tolerances."""
+    return np.concatenate([jacobian, np.eye(jacobian.shape[1])])
 
 
 def _by_pieces(data: Data, found: Fit) -> Array:
     """Variance of each unknown, in σ² of its tolerance, from how pieces of the windows pull at it: (unknowns,)."""
     calibration = found.calibration
     jacobian, residual = calibration.weighted_jacobian, calibration.residual
-    inverse = covariance_of(jacobian)
+    inverse = covariance_of(_with_prior(jacobian))
     variances = []
     for count in _PIECES:
         pieces = _pieces(data, found, count)

@@ -33,7 +33,7 @@ def claimed(story: Story, accepted: Sequence[Trial], tell: Progress) -> Claim | 
     """The best trial that nothing speaks against, those that cannot be told from it, and further orders of it.
 
     None where none is to be claimed.  A trial that tells far less than one that is refused only bends as that one does;
-    so does one by orders, where another law of the same orders tells more.
+    so does one by orders, where another law of the same orders tells more, and one of which a refused term tells all.
     """
     left = [trial for trial in accepted if trial.drop > SECOND * accepted[0].drop]
     by_orders: list[Trial] = []  # refused, each with the further orders of its law
@@ -66,7 +66,7 @@ def claimed(story: Story, accepted: Sequence[Trial], tell: Progress) -> Claim | 
             reason = spoken if whole is best else reason
         story.refused[best.candidate.name] = reason
         by_orders += [] if further is None else [more or best]
-        left = [trial for trial in left if trial is not best]
+        left = [trial for trial in left if trial is not best and not _is_no_more(story, trial, best)]
     return None
 
 
@@ -84,8 +84,8 @@ def _chosen(story: Story, accepted: Sequence[Trial]) -> tuple[Trial, list[Trial]
         for trial in accepted
         if _short_of(story, trial, first) < TIE or (is_far and trial.drop > ALIKE * first.drop)
     ]
-    simplest = _simplest(story, tied)
-    effects = [trial for trial in simplest if not stands_for(story.current, trial)] or simplest[:1]
+    simple = simplest(story, tied)
+    effects = [trial for trial in simple if not stands_for(story.current, trial)] or simple[:1]
     if not is_far or story.held is None:
         best = min(effects, key=lambda trial: _short_of(story, trial, first) + price(story.data, story.current, trial))
         return best, [trial for trial in tied if trial is not best]
@@ -95,14 +95,14 @@ def _chosen(story: Story, accepted: Sequence[Trial]) -> tuple[Trial, list[Trial]
     return best, [trial for trial in tied if trial is not best and unseen[trial.candidate.name] <= near]
 
 
-def _simplest(story: Story, tied: Sequence[Trial]) -> list[Trial]:
+def simplest(story: Story, trials: Sequence[Trial]) -> list[Trial]:
     """Those of which no term of the series tells as much: where one does, the motion shows no more than that."""
+    return [trial for trial in trials if not any(_is_no_more(story, trial, other) for other in trials)]
 
-    def is_a_term(other: Trial, trial: Trial) -> bool:
-        terms = find(trial.candidate.name).terms
-        return other.candidate.name in terms and _short_of(story, other, trial) < TIE
 
-    return [trial for trial in tied if not any(is_a_term(other, trial) for other in tied)]
+def _is_no_more(story: Story, trial: Trial, other: Trial) -> bool:
+    """Whether another trial is a term of this one's series, and tells as much."""
+    return other.candidate.name in find(trial.candidate.name).terms and _short_of(story, other, trial) < TIE
 
 
 def _short_of(story: Story, trial: Trial, first: Trial) -> float:

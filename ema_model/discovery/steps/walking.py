@@ -17,7 +17,7 @@ from ema_model.discovery.observed.transmission import transmission_seen
 from ema_model.discovery.observed.two_masses import two_masses_seen
 from ema_model.discovery.result import Candidate
 from ema_model.discovery.steps.beside_a_fault import beside_a_fault
-from ema_model.discovery.steps.claim import claimed
+from ema_model.discovery.steps.claim import claimed, simplest
 from ema_model.discovery.steps.contradiction import contradictions
 from ema_model.discovery.steps.dropped import drop_doubtful, drop_idle
 from ema_model.discovery.steps.path import Story
@@ -183,7 +183,7 @@ class _Walk:
             trials = story.tried_whole([one for one in ranked if one not in [t.candidate for t in trials]], tell)
             accepted = [trial for trial in trials if pays(story.current, trial, story.data, story.held)]
         claim = claimed(story, accepted, tell)
-        leader = next(iter(trials), None)
+        leader = next(iter(simplest(story, trials)), None)
         if leader and (claim is None or (claim.best.drop < leader.drop and leader not in claim.others)):
             fault = beside_a_fault(story, leader, tell)
             if fault:

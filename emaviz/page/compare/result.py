@@ -15,7 +15,7 @@ from ema_model.actuator import Actuator
 from ema_model.comparison.regions import Region, worst_moment
 from ema_model.comparison.result import Compared, Comparison, details, errors, errors_by_recording, of_floor
 from ema_model.errors import InputError
-from ema_model.estimation.calibrate import calibration_table
+from ema_model.estimation.calibrate import calibration_table, together
 from ema_model.faults import HEALTHY
 from ema_model.quantities.variables import VARIABLES
 from ema_model.recordings import Measurement
@@ -156,7 +156,10 @@ class ComparePlots:
         self._choose(comparison.primary, first)
         fit = comparison.calibration
         table = shown(calibration_table(fit, comparison.actuator.axes) if fit is not None else None)
-        self._numbers.content = html('<div style="overflow-x:auto;font-size:11px;padding:0 2px">{}</div>', table)
+        said = " ".join(together(fit, comparison.actuator.axes)) if fit is not None else ""
+        self._numbers.content = html(
+            '<div style="overflow-x:auto;font-size:11px;padding:0 2px">{}<p>{}</p></div>', table, said
+        )
         self._draw(list(self._all()))
 
     def show(self, view: View) -> None:

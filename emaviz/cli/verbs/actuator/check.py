@@ -89,8 +89,9 @@ def _beside(actuator: Actuator, arguments: argparse.Namespace) -> dict[str, list
         one = calibration.parameters[path]
         shown = on_axes(path, actuator.axes).path
         strange.append(f"{shown} ends at the edge of its tolerance, at {one.value:g} {one.unit}".rstrip())
-    from ema_model.estimation.calibrate import told
+    from ema_model.estimation.calibrate import together, told
 
+    unseen += [sentence.rstrip(".") for sentence in together(calibration, actuator.axes)]
     for one in told(calibration):
         shown = on_axes(one.name, actuator.axes).path
         if one.is_unseen:

@@ -1,0 +1,131 @@
+"""What recordings tell of the unknowns of a fit: the directions they hardly show, and what is known only together.
+
+A difference over a small step along one unknown after the other tells nothing of a combination of them in which the
+signals do not change: its truncation, or the roughness of stick and slip, stands there as information.  So those
+directions are simulated themselves, over as far as the fit leaves them open.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ema_model.quantities.numbers import HALF_90
+
+if TYPE_CHECKING:
+    from ema_model.estimation.problem import Problem
+
+Array = NDArray[np.float64]
+
+_WEAK = 0.05  # σ of its prior, that a direction must be left open by to be simulated: less is known well either way
+_ROUNDS = 3  # of measurements: what was false information leaves its direction wider open than was seen before
+_ROOM = 0.02  # of the longest way, that one must be long within the bounds to tell anything
+_GROWN = 1.2  # times as wide open, from which on a direction is measured again
+
+
+def covariance_of(jacobian: Array) -> Array:
+    """(JᵀJ)⁻¹ of a Jacobian (rows, unknowns) of full rank; JᵀJ itself would round a prior away beside fine floors."""
+    root = np.linalg.inv(np.linalg.qr(jacobian, mode="r"))
+    return root @ root.T
+
+
+def measured(problem: Problem, x: Array, jacobian: Array, scale: float = 1.0) -> Array:
+    """The derivatives (values + unknowns, unknowns) at x, those along weak directions taken by simulating along them.
+
+    jacobian: by the problem's own steps, with its prior's rows below; scale: by which what the model misses widens the
+    covariance.  A direction is an eigenvector of the covariance; positive quantities are moved along it by ratios.
+    """
+    found, before = jacobian, np.zeros(problem.count)
+    for _ in range(_ROUNDS):
+        variances, directions = np.linalg.eigh(covariance_of(found))
+        open_by = np.sqrt(np.minimum(1.0, scale * variances))
+        weak = open_by > _WEAK
+        if not (open_by > _GROWN * np.maximum(before, _WEAK)).any():
+            break
+        before = open_by
+        steps = open_by[weak, None] * directions[:, weak].T
+        at = np.broadcast_to(x, steps.shape)
+        ends = [problem.clip(problem.moved(at, sign * steps)) for sign in (-1.0, 1.0)]
+        ways = problem.distance(at, *ends)
+        below, above = np.split(problem.residuals(np.concatenate(ends)), 2)
+        changes = (above - below)[:, : problem.values]
+        shown = found[: problem.values]
+        # Of all derivatives that make these ways change the signals as they do, those nearest to the known ones.
+        least = np.linalg.pinv(ways, rcond=_ROOM)
+        found = np.concatenate([shown - (least @ (ways @ shown.T - changes)).T, found[problem.values :]])
+    return found
+
+
+# --- what is known only together: products of powers that recordings tell, though none of their factors ---------------
+
+_BY_OTHERS = 3.0  # how many times wider open a factor must be than if all others were known
+_KNOWN = 0.2  # of what its factors leave each on its own, that a product may be left open by
+_POWERS = {
+    2: (1, -1, 2, -2),
+    3: (1, -1),
+    4: (1, -1),
+}  # by the number of factors: more of them bend any sum to a product
+_MOST_OPEN = 8
+
+
+@dataclass(frozen=True)
+class Combination:
+    """A product of powers of parameters that is known far better than any of them."""
+
+    powers: dict[str, int]  # by "section.parameter"
+    value: float
+    relative: float  # 1 σ of the value, as a share of it
+
+    @property
+    def interval90(self) -> tuple[float, float]:
+        """Its ends; a product of positive quantities is positive."""
+        half = HALF_90 * self.relative
+        return self.value * math.exp(-half), self.value * math.exp(half)
+
+
+def known_together(names: Sequence[str], values: Array, sigmas: Array, covariance: Array) -> tuple[Combination, ...]:
+    """The combinations of positive parameters that recordings tell, simplest first, none of which follows from others.
+
+    values, sigmas: (n,) as fitted, and 1 σ of the prior in the same unit; covariance: (n, n) in units of sigmas.
+    """
+    shares = sigmas / values
+    logarithms = covariance * np.outer(shares, shares)
+    taken_up = np.sqrt(np.diag(covariance) * np.diag(np.linalg.inv(covariance)))
+    order = np.argsort(-taken_up, kind="stable")[:_MOST_OPEN]
+    open_ones = sorted(int(i) for i in order if taken_up[i] > _BY_OTHERS)
+    found: list[tuple[Array, Combination]] = []
+    for factors in _POWERS:
+        seen = [
+            one
+            for places in itertools.combinations(open_ones, factors)
+            for powers in itertools.product(_POWERS[factors], repeat=factors)
+            if powers[0] > 0 and (one := _product(np.array(places), np.array(powers), logarithms)) is not None
+        ]
+        for relative, places, powers in sorted(seen, key=lambda one: (int(np.abs(one[2]).sum()), one[0])):
+            vector = np.zeros(len(names))
+            vector[places] = powers
+            known = [one for one, _ in found]
+            if np.linalg.matrix_rank(np.array([*known, vector])) == len(known):
+                continue  # it follows from those
+            value = float(np.prod(values[places] ** powers))
+            pairs = {names[place]: int(power) for place, power in zip(places, powers)}
+            found.append((vector, Combination(pairs, value, relative)))
+    return tuple(one for _, one in found)
+
+
+def _product(
+    places: NDArray[np.int_], powers: NDArray[np.int_], logarithms: Array
+) -> tuple[float, NDArray[np.int_], NDArray[np.int_]] | None:
+    """1 σ of a product, as a share of it, where it is known far better than each factor and any part of it."""
+    if np.gcd.reduce(powers) > 1:
+        return None
+    its = logarithms[np.ix_(places, places)]
+    relative = math.sqrt(max(0.0, float(powers @ its @ powers)))
+    each = np.abs(powers) * np.sqrt(np.diag(its))
+    return (relative, places, powers) if relative < _KNOWN * float(each.min()) else None

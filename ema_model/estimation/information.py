@@ -24,9 +24,9 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 _WEAK = 0.05  # σ of its prior, that a direction must be left open by to be simulated: less is known well either way
-_ROUNDS = 3  # of measurements: what was false information leaves its direction wider open than was seen before
+_ROUNDS = 12  # of measurements: what was false information leaves its direction wider open than was seen before
 _ROOM = 0.02  # of the longest way, that one must be long within the bounds to tell anything
-_GROWN = 1.2  # times as wide open, from which on a direction is measured again
+_GROWN = 1.05  # times as wide open, from which on a direction is measured again
 
 
 def covariance_of(jacobian: Array) -> Array:

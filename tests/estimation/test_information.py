@@ -189,14 +189,15 @@ def test_where_a_voltage_limit_breaks_the_family_it_may_be_told():
     assert wide.left(1)[0] < 0.5
 
 
-def test_what_is_known_only_together_is_said(capsys):
+def test_what_is_known_only_together_is_said():
     family = FAMILIES["servo, strength"]
     result = compare([servo(1, 3e-4)], family.actuator())
     document = as_dict(result)
-    product = next(one for one in document["identifiable"] if one["members"] == {GAIN: 1, K: 1, R: -1})
-    assert product["combination"] == "controller gain · motor torque constant / motor resistance"
+    product = next(one for one in document["identifiable"] if one["members"] == {GAIN: 1, K: 1, R: -1, MOMENT: -1})
+    said = "controller gain · motor torque constant / (motor resistance · pendulum load: moment)"
+    assert product["combination"] == said
     low, high = product["interval90"]
-    assert low < TRUE["G"] * TRUE["K"] / TRUE["R"] < high
+    assert low < TRUE["G"] * TRUE["K"] / (TRUE["R"] * TRUE["M"]) < high
     assert "Known only together: " in str(result) and "Record the current as well" in str(result)
 
 

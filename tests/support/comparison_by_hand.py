@@ -151,7 +151,7 @@ def _explanations() -> list[Explanation]:
         ("current", "sign_speed", 0.21, True, "The residual current grows with the current, against the motion."),
         ("acceleration", "1", -0.02, False, "The acceleration tells nothing."),
     )
-    return [Explanation("current_A", v, m, r2, r2, sure, none, none, none, text) for v, m, r2, sure, text in told]
+    return [Explanation("current_A", v, m, r2, sure, none, none, none, text, r2) for v, m, r2, sure, text in told]
 
 
 def _by_angle(residuals: Residuals) -> Region:
@@ -199,6 +199,7 @@ def _calibration(before: Actuator, after: Actuator, recordings: Sequence[Compare
         room=(np.zeros(0), np.zeros(0)),
         evaluations=12,
         confounded=(("motor.static_friction_Nm", "motor.dynamic_friction_Nm"),),
+        identifiable=(),
         free=tuple(parameters),
     )
 

@@ -508,7 +508,8 @@ class EffectParameterJson(TypedDict):
     """A parameter of an added effect, in its `unit`; one that was chosen, as a whole order, was not fitted."""
 
     value: Annotated[float, Meta(description="what was found")]
-    interval90: Annotated[IntervalJson, Meta(description="the ends of the 90 % interval about value")]
+    interval90: Annotated[IntervalJson | None, Meta(description="the ends of the 90 % interval about value")]
+    from_file: NotRequired[Annotated[bool, Meta(description="whether the interval is null, as nothing is told")]]
     unit: Annotated[str, Meta(description="of value, initial and interval90; empty for a ratio")]
     initial: NotRequired[Annotated[float, Meta(description="what the fit began with; of a fitted one")]]
     z: NotRequired[Annotated[float, Meta(description="value − initial, in σ of its tolerance; of a fitted one")]]

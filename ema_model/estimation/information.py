@@ -114,7 +114,7 @@ def known_together(names: Sequence[str], values: Array, sigmas: Array, covarianc
             if np.linalg.matrix_rank(np.array([*known, vector])) == len(known):
                 continue  # it follows from those
             value = float(np.prod(values[places] ** powers))
-            pairs: dict[str, int] = {names[place]: int(power) for place, power in zip(places, powers)}
+            pairs = {names[int(place)]: int(power) for place, power in zip(places, powers)}
             found.append((vector, Combination(pairs, value, relative)))
     return tuple(one for _, one in found)
 

@@ -140,6 +140,7 @@ def test_next_experiment_tells_rivals_apart():
     assert 0.0 < found.duration_s <= 3.0
 
 
+@pytest.mark.long
 def test_a_test_is_sought_beside_an_effect_of_the_file_too():
     """One rival frees the file's hinge, the other adds an inertia beside it: both hold a hinge."""
     hinged = replace(ACTUATOR, effects={"hinge_moment": {"stiffness_Nm_rad": 500.0}})

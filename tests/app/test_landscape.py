@@ -129,6 +129,7 @@ def answer(**known):
         "warnings": (),
         "separated_by": None,
         "hardly_known": (),
+        "uninformative": False,
     }
     return SimpleNamespace(uncertainty=SimpleNamespace(**{**usual, **known}), polished=True)
 

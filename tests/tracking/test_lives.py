@@ -12,7 +12,7 @@ from ema_model.estimation.problem import to_vector
 from ema_model.identification.fit import refine, setting
 from ema_model.identification.search import Objective
 from ema_model.identification.uncertainty import uncertainty
-from ema_model.lives import LAWS, healthy_life, recorded, worn_life
+from ema_model.lives import LAWS, drawn, healthy_life, recorded, worn_life
 from ema_model.lives.life import base_of, unit_of
 
 
@@ -59,7 +59,7 @@ def test_drawn_flights_share_what_is_the_units():
     own, units = [], []
     for seed in range(20):
         life = healthy_life(seed, 60)
-        flights = recorded(life)
+        flights = drawn(life)
         kept = [one for one in flights if not one.excluded]
         assert [one.name for one in flights] == sorted(one.name for one in flights)
         assert len(kept) == life.usable.sum()
@@ -82,7 +82,7 @@ def test_a_recorded_flight_is_told_as_drawn_ones_are():
     )
     assert sure.adequate
     np.testing.assert_allclose(sure.own + sure.common @ sure.common.T, sure.covariance, atol=1e-6)
-    like = recorded(life)[number]
+    like = drawn(life)[number]
     for given in (sure, like):
         assert 1e-3 < np.sqrt(given.own[0, 0]) < 0.1
         assert np.linalg.norm(given.common[0]) > np.sqrt(given.own[0, 0]), "the unit's part is the larger"

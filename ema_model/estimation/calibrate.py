@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from ema_model.actuator import Actuator
 from ema_model.actuator.parameters import on_axes
 from ema_model.estimation.floor import CORRELATED_S, Floor, local_rms
-from ema_model.estimation.information import Combination, covariance_of, known_together, measured
+from ema_model.estimation.information import Combination, covariance_of, known_together, measured, posterior
 from ema_model.estimation.least_squares import descended
 from ema_model.estimation.problem import (
     ECCENTRICITY,
@@ -65,11 +65,10 @@ class Told:
 
 def told(calibration: Calibration) -> tuple[Told, ...]:
     """One for each free parameter, in the file's order."""
-    jacobian = calibration.weighted_jacobian
-    information = jacobian.T @ jacobian / calibration.covariance_scale
-    covariance = np.linalg.inv(information + np.eye(len(information)))
+    jacobian = calibration.weighted_jacobian / np.sqrt(calibration.covariance_scale)
+    covariance = posterior(jacobian)
     left = np.sqrt(np.diag(covariance))
-    alone = 1.0 / np.sqrt(1.0 + np.diag(information))
+    alone = 1.0 / np.sqrt(1.0 + np.sum(jacobian**2, axis=0))
     correlation = np.abs(covariance / np.outer(left, left))
     names = calibration.free
     found = []

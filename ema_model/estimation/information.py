@@ -35,6 +35,11 @@ def covariance_of(jacobian: Array) -> Array:
     return root @ root.T
 
 
+def posterior(sensitivities: Array) -> Array:
+    """(JᵀJ + 1)⁻¹ of weighted sensitivities (values, unknowns), by unknowns in σ of their tolerances."""
+    return covariance_of(np.concatenate([sensitivities, np.eye(sensitivities.shape[1])]))
+
+
 def measured(problem: Problem, x: Array, jacobian: Array, scale: float = 1.0) -> Array:
     """The derivatives (values + unknowns, unknowns) at x, those along weak directions taken by simulating along them.
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from ema_model.discovery.evidence.counted import colour_of
-from ema_model.discovery.evidence.uncertainty import is_base, with_prior
-from ema_model.estimation.information import covariance_of
+from ema_model.discovery.evidence.uncertainty import is_base
+from ema_model.estimation.information import posterior
 from ema_model.estimation.model_fit import Data, Fit
 
 _FAR = 3.0  # σ of a parameter's tolerance, beyond which it lies outside
@@ -24,7 +24,7 @@ def outside_tolerance(data: Data, found: Fit) -> list[str]:
     if found.plant.simulates_commands:
         return [name for name in calibration.outside_tolerance if is_base(name)]
     jacobian = calibration.weighted_jacobian / np.sqrt(colour_of(data, found))[:, None]
-    expected = np.eye(calibration.x.size) - covariance_of(with_prior(jacobian))
+    expected = np.eye(calibration.x.size) - posterior(jacobian)
     spread = np.sqrt(np.maximum(np.diag(expected), np.finfo(float).eps))
     together = np.abs(expected / np.outer(spread, spread)) > _TOGETHER
     told: list[int] = []

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from ema_model.discovery.evidence.counted import colour_of, signals_of
 from ema_model.estimation import Calibration
 from ema_model.estimation.calibrate import calibrated, problem_of
-from ema_model.estimation.information import covariance_of
+from ema_model.estimation.information import posterior
 from ema_model.estimation.model_fit import Data, Fit, fit
 from ema_model.quantities.numbers import HALF_90
 
@@ -34,7 +34,7 @@ def with_intervals(data: Data, found: Fit) -> Calibration:
     """
     calibration = found.calibration
     jacobian = calibration.weighted_jacobian / np.sqrt(colour_of(data, found))[:, None]
-    covariance = covariance_of(with_prior(jacobian))
+    covariance = posterior(jacobian)
     problem = problem_of(found.plant, data.floors, free=calibration.free, signals=data.signals)
     variance, most = np.diag(covariance), 1.0 if found.plant.simulates_commands else _OF_FILE
     by_file = np.sum(covariance**2, axis=1)  # of it, what the tolerances leave open
@@ -44,16 +44,11 @@ def with_intervals(data: Data, found: Fit) -> Calibration:
     return replace(calibration, parameters=parameters).as_result
 
 
-def with_prior(jacobian: Array) -> Array:
-    """Of unknowns in σ of their tolerances."""
-    return np.concatenate([jacobian, np.eye(jacobian.shape[1])])
-
-
 def _by_pieces(data: Data, found: Fit) -> Array:
     """Variance of each unknown, in σ² of its tolerance, from how pieces of the windows pull at it: (unknowns,)."""
     calibration = found.calibration
     jacobian, residual = calibration.weighted_jacobian, calibration.residual
-    inverse = covariance_of(with_prior(jacobian))
+    inverse = posterior(jacobian)
     variances = []
     for count in _PIECES:
         pieces = _pieces(data, found, count)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import importlib.metadata
 import os
 import re
 import shlex
@@ -223,3 +224,43 @@ def test_the_log_that_lines_are_shown_on_is_one_of_the_reference_model(tmp_path)
     for name in ("user_position_rad", "motor_speed_rad_s", "current_A"):
         off = np.sqrt(np.mean((shipped[name] - again[name]) ** 2)) / np.std(again[name])
         assert off < 0.02, name
+
+
+_WITHOUT = """
+import importlib, importlib.abc, pkgutil, sys
+
+class Absent(importlib.abc.MetaPathFinder):
+    def find_spec(self, name, path=None, target=None):
+        if name.partition(".")[0] in absent:
+            raise ModuleNotFoundError(f"No module named {name!r}", name=name)
+
+absent = set(sys.argv[1].split(","))
+sys.meta_path.insert(0, Absent())
+import ema_model, emaviz
+for package in (ema_model, emaviz):
+    for module in pkgutil.walk_packages(package.__path__, package.__name__ + "."):
+        if not module.name.endswith("__main__") and module.name not in sys.argv[2:]:
+            importlib.import_module(module.name)
+"""
+
+
+def test_every_module_is_there_with_what_the_readme_installs():
+    """The tests' lock holds more, Dask among it: a module that needs it at its top would keep the app from starting."""
+
+    def usual(name: str) -> str:
+        return re.sub(r"[-_.]+", "-", name).lower()
+
+    app, tests = (
+        {usual(line.partition("==")[0]) for line in lock.read_text(encoding="utf-8").splitlines() if "==" in line}
+        for lock in (ROOT / "lock.txt", ROOT / "tests" / "lock.txt")
+    )
+    absent = [
+        module
+        for module, owners in importlib.metadata.packages_distributions().items()
+        if {usual(owner) for owner in owners} <= tests - app
+    ]
+    assert "distributed" in absent and "numpy" not in absent
+    by_choice = ("ema_model.campaign.dask_worker",)  # what --scheduler alone imports
+    line = [sys.executable, "-c", _WITHOUT, ",".join(absent), *by_choice]
+    done = subprocess.run(line, capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr

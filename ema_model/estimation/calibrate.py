@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from ema_model.actuator import Actuator
 from ema_model.actuator.parameters import on_axes
 from ema_model.estimation.floor import CORRELATED_S, Floor, local_rms
-from ema_model.estimation.information import Combination, covariance_of, known_together, measured, posterior
+from ema_model.estimation.information import Combination, by_pieces, covariance_of, known_together, measured, posterior
 from ema_model.estimation.least_squares import descended
 from ema_model.estimation.problem import (
     ECCENTRICITY,
@@ -212,7 +212,7 @@ def warnings(fit: Calibration, axes: Axes) -> list[str]:
 
 
 def together(fit: Calibration, axes: Axes) -> list[str]:
-    """'Known only together: gain · torque constant / resistance = 0.0230 ± 0.0021. Record the current as well, …'"""
+    """'Known only together, if the model is right: gain · torque constant / resistance = 0.0230 ± 0.0021. …'"""
     if not fit.identifiable:
         return []
     found = []
@@ -221,7 +221,7 @@ def together(fit: Calibration, axes: Axes) -> list[str]:
         found.append(f"{product_in_words(one, axes)} = {with_uncertainty(one.value, 0.5 * (high - low), '')}")
     silent = "current_A" not in {name for part in fit.weighted_sensitivities for name in part}
     how = "Record the current as well, or measure one of them apart" if silent else "Measure one of them apart"
-    return [f"Known only together: {'; '.join(found)}. {how}."]
+    return [f"Known only together, if the model is right: {'; '.join(found)}. {how}."]
 
 
 def product_in_words(one: Combination, axes: Axes) -> str:
@@ -377,7 +377,7 @@ def calibrate(
         room=(problem.low - x, problem.high - x),
         evaluations=search.evaluations,
         confounded=_confounded(problem.unknowns, covariance),
-        identifiable=_products(problem, x, covariance),
+        identifiable=_products(problem, x, covariance, jacobian[: problem.values], fit.residual),
         free=chosen,
     )
 
@@ -555,13 +555,19 @@ def _eccentricity(problem: Problem, x: Array, covariance: Array) -> dict[str, Ca
     return found
 
 
-def _products(problem: Problem, x: Array, covariance: Array) -> tuple[Combination, ...]:
-    at = [i for i, u in enumerate(problem.unknowns) if u.is_scale]
-    values = [(u.nominal + u.sigma * x[i], u.sigma) for i, u in enumerate(problem.unknowns) if u.is_scale]
-    if not at:
+def _products(
+    problem: Problem, x: Array, covariance: Array, sensitivities: Array, residual: Array
+) -> tuple[Combination, ...]:
+    """What is known only together, as surely as noise and what is left both allow."""
+    scales = [i for i, unknown in enumerate(problem.unknowns) if unknown.is_scale]
+    if not scales or not problem.values:
         return ()
-    found, sigmas = np.array(values).T
-    return known_together([problem.unknowns[i].name for i in at], found, sigmas, covariance[np.ix_(at, at)])
+    lasting = by_pieces(sensitivities, residual, [(window, rows) for window, _, rows in problem.parts()])
+    covariance = covariance + max(lasting, key=np.trace)
+    unknowns = [problem.unknowns[i] for i in scales]
+    values = np.array([one.nominal + one.sigma * x[i] for i, one in zip(scales, unknowns)])
+    sigmas = np.array([one.sigma for one in unknowns])
+    return known_together([one.name for one in unknowns], values, sigmas, covariance[np.ix_(scales, scales)])
 
 
 def _confounded(unknowns: Sequence[Unknown], covariance: NDArray[np.floating]) -> tuple[tuple[str, str], ...]:

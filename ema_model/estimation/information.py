@@ -40,6 +40,31 @@ def posterior(sensitivities: Array) -> Array:
     return covariance_of(np.concatenate([sensitivities, np.eye(sensitivities.shape[1])]))
 
 
+_PIECES = 12, 25  # of each window, whose pulls on the unknowns are independent: the division that says least counts
+
+
+def by_pieces(sensitivities: Array, residual: Array, parts: Sequence[tuple[int, slice]]) -> list[Array]:
+    """Covariances (unknowns, unknowns), in σ² of the tolerances, from how pieces of windows pull at a fit's unknowns.
+
+    What is left may last where a model is not quite the rig's: White, Econometrica 48 (1980), by clusters.
+    sensitivities: weighted, (values, unknowns); residual: (values,); parts: window and rows of each of its signals, all
+    signals of a moment in the same piece.
+    """
+    inverse = posterior(sensitivities)
+    found = []
+    for count in _PIECES:
+        places = [
+            window * count + np.arange(rows.stop - rows.start) * count // (rows.stop - rows.start)
+            for window, rows in parts
+        ]
+        pieces = np.unique(np.concatenate(places), return_inverse=True)[1]
+        pulls = np.zeros((pieces.max() + 1, sensitivities.shape[1]))
+        np.add.at(pulls, pieces, sensitivities * residual[:, None])
+        pulls = (pulls - pulls.mean(axis=0)) @ inverse * np.sqrt(len(pulls) / (len(pulls) - 1.0))
+        found.append(pulls.T @ pulls + inverse @ inverse)  # the prior pulls as well
+    return found
+
+
 def measured(problem: Problem, x: Array, jacobian: Array, scale: float = 1.0) -> Array:
     """The derivatives (values + unknowns, unknowns) at x, those along weak directions taken by simulating along them.
 

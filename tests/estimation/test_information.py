@@ -198,7 +198,7 @@ def test_what_is_known_only_together_is_said():
     assert product["combination"] == said
     low, high = product["interval90"]
     assert low < TRUE["G"] * TRUE["K"] / (TRUE["R"] * TRUE["M"]) < high
-    assert "Known only together: " in str(result) and "Record the current as well" in str(result)
+    assert "Known only together, if the model is right: " in str(result) and "Record the current as well" in str(result)
 
 
 def test_products_are_found_by_their_powers():

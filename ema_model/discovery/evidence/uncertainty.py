@@ -12,14 +12,13 @@ from numpy.typing import NDArray
 from ema_model.discovery.evidence.counted import colour_of, signals_of
 from ema_model.estimation import Calibration
 from ema_model.estimation.calibrate import calibrated, problem_of
-from ema_model.estimation.information import posterior
+from ema_model.estimation.information import by_pieces, posterior
 from ema_model.estimation.model_fit import Data, Fit, fit
 from ema_model.quantities.numbers import HALF_90
 
 Array = NDArray[np.float64]
 
 _OF_FILE = 2.0 / HALF_90  # times that a tolerance counts which nothing checks
-_PIECES = 12, 25  # of each window, whose pulls on the parameters are independent: the division that says least counts
 _ROUNDS = 6  # of fits at most, each without the parameters that the one before drove to their bounds
 
 
@@ -46,27 +45,12 @@ def with_intervals(data: Data, found: Fit) -> Calibration:
 
 def _by_pieces(data: Data, found: Fit) -> Array:
     """Variance of each unknown, in σ² of its tolerance, from how pieces of the windows pull at it: (unknowns,)."""
-    calibration = found.calibration
-    jacobian, residual = calibration.weighted_jacobian, calibration.residual
-    inverse = posterior(jacobian)
-    variances = []
-    for count in _PIECES:
-        pieces = _pieces(data, found, count)
-        pulls = np.zeros((pieces.max() + 1, jacobian.shape[1]))
-        np.add.at(pulls, pieces, jacobian * residual[:, None])
-        pulls = inverse @ (pulls - pulls.mean(axis=0)).T * np.sqrt(len(pulls) / (len(pulls) - 1.0))
-        variances.append(np.sum(pulls**2, axis=1) + np.sum(inverse**2, axis=1))  # the prior pulls as well
-    return np.maximum(*variances)
-
-
-def _pieces(data: Data, found: Fit, count: int) -> NDArray[np.intp]:
-    """Which piece of its window each value of a residual lies in, all signals of a moment in the same: (values,)."""
     windows = [i for i, one in enumerate(found.plant.windows) for name in data.signals if name in one.measured]
-    parts = [
-        window * count + np.arange(rows.stop - rows.start) * count // (rows.stop - rows.start)
-        for window, (_, rows) in zip(windows, signals_of(data, found.plant))
-    ]
-    return np.unique(np.concatenate(parts), return_inverse=True)[1]
+    parts = [(window, rows) for window, (_, rows) in zip(windows, signals_of(data, found.plant))]
+    calibration = found.calibration
+    return np.max(
+        [np.diag(one) for one in by_pieces(calibration.weighted_jacobian, calibration.residual, parts)], axis=0
+    )
 
 
 def settled(data: Data, found: Fit, tell: Callable[[str], None]) -> Fit:

@@ -82,6 +82,7 @@ class FreeMotion:
     windows: Sequence[LoopWindow]
     signals: Sequence[Signals]  # by window, (blocks,) each; not finite where the model diverges
     offsets: Sequence[float]  # by recording, that were added to what was put in, A or N·m
+    beside: Sequence[Sequence[Signals]]  # as `signals`, with offsets a hundred-thousandth of the input less, and more
 
 
 def free_motion(recordings: Sequence[Measurement], actuator: Actuator, offset: float | None = None) -> FreeMotion:
@@ -102,7 +103,11 @@ def free_motion(recordings: Sequence[Measurement], actuator: Actuator, offset: f
     if offset is None:
         coarse = model.at_longer_steps(_OFFSET_STEP_S)
         offsets = [_best_offset(coarse, recording) for recording in range(len(even))]
-    return FreeMotion(model.windows, _moved(model, offsets), offsets)
+    sizes = [_size(model, recording) for recording in range(len(even))]
+    less, more = (
+        [offset + sign * _FINEST_OFFSET * size for offset, size in zip(offsets, sizes)] for sign in (-1.0, 1.0)
+    )
+    return FreeMotion(model.windows, _moved(model, offsets), offsets, [_moved(model, one) for one in (less, more)])
 
 
 def _as_put_in(measurement: Measurement, actuator: Actuator) -> Measurement:
@@ -143,6 +148,12 @@ def _moved(model: ClosedLoop, offsets: Sequence[float], recording: int | None = 
     return windows(of_window, chosen)
 
 
+def _size(model: ClosedLoop, recording: int) -> float:
+    """The rms of what is put in, A or N·m."""
+    put_in = [window.command for window in model.windows if window.recording == recording]
+    return float(np.sqrt(np.mean(np.concatenate(put_in) ** 2))) if put_in else 0.0
+
+
 def _best_offset(model: ClosedLoop, recording: int) -> float:
     """The offset of what is put in with which the model meets the motor's position in a recording best."""
     from scipy.optimize import minimize_scalar  # takes a third of a second to import
@@ -150,9 +161,8 @@ def _best_offset(model: ClosedLoop, recording: int) -> float:
     chosen = [window for window in model.windows if window.recording == recording]
     if not chosen:
         return 0.0
-    put_in = np.concatenate([one.command for one in chosen])
-    size = float(np.sqrt(np.mean(put_in**2)))
-    trials = int(np.clip(_MOST_STEPS / put_in.size, _LEAST_TRIALS, _MOST_TRIALS))
+    size = _size(model, recording)
+    trials = int(np.clip(_MOST_STEPS / sum(one.command.size for one in chosen), _LEAST_TRIALS, _MOST_TRIALS))
     if size == 0.0:
         return 0.0
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -10,9 +11,10 @@ from support.unknown_drive import drive_of, logged
 
 from ema_model.actuator import load_actuator
 from ema_model.comparison import as_dict, compare
+from ema_model.comparison.free_simulation import _scores
 from ema_model.discovery import as_dict as discovery_as_dict
 from ema_model.discovery import discover
-from ema_model.models.open_loop import free_motion
+from ema_model.models.open_loop import FreeMotion, free_motion
 from ema_model.recordings import Measurement
 from ema_model.recordings.measurement import Sensors
 from ema_model.simulation.run import Run, simulate_reference
@@ -45,6 +47,20 @@ def by_hand(recording, inertia: float, viscous: float, dry: float, offset_A: flo
 @pytest.fixture
 def actuator(tmp_path):
     return drive_of(tmp_path, leaves_out_reversals=False)
+
+
+def test_an_error_that_a_trifle_changes_is_no_number(actuator):
+    """Where a motor stops and starts, a hundred-thousandth of the current decides when: any of many errors might be."""
+    measured = np.sin(np.linspace(0.0, 20.0, 400))
+    window = SimpleNamespace(measured={"motor_position_rad": measured})
+
+    def of(*apart: float):
+        here, less, more = ([{"motor_position_rad": measured + one}] for one in apart)
+        return _scores(FreeMotion([window], here, [0.0], [less, more]), actuator)["motor_position_rad"]
+
+    assert of(0.2, 0.2005, 0.1995).rmse == pytest.approx(0.2)
+    assert np.isnan(of(0.2, 0.15, 0.2).rmse) and "a hundred-thousandth more or less" in of(0.2, 0.2, 0.3).reason
+    assert np.isnan(of(0.2, np.nan, 0.2).rmse)
 
 
 def test_true_parameters_follow_the_motion_from_the_recorded_current(actuator):

@@ -145,7 +145,7 @@ def _where_stable(name: str, pair: Pair, beside: Sequence[Pair], actuator: Actua
     shown = of_signal(actuator.axes.signal(name), actuator.axes).scaled([found.rmse, own])
     title = in_sentence(shown.title)
     if found.rmse < own:
-        return without(f"in open loop a hundred-thousandth more or less put in moves the {title} elsewhere")
+        return without("in open loop a hundred-thousandth more or less put in leads elsewhere")
     return without(
         f"in open loop the error adds up to {shown.text(found.rmse)} rms, "
         f"and the {title} itself departs from its mean by {shown.text(own)}"

@@ -25,7 +25,7 @@ from ema_model.estimation.calibrate import (
 )
 from ema_model.quantities.axes import ROTARY, SIGNALS, Axes, of_residual, of_signal
 from ema_model.quantities.numbers import IntervalJson, Quantity, number
-from ema_model.quantities.titles import in_sentence
+from ema_model.quantities.titles import all_of, in_sentence
 from ema_model.quantities.variables import of_variable
 from ema_model.recordings.health import HealthJson
 from ema_model.recordings.noise import least_noise
@@ -194,11 +194,12 @@ def _error_table(title: str, result: Comparison, of: Sequence[tuple[str, str, Si
 
 
 def free_simulation(simulation: Mapping[str, Simulated], axes: Axes) -> list[Table | Lines]:
-    """The errors of the model running freely, and a line for each signal that has none."""
+    """The errors of the model running freely, and a line for each reason why there is none."""
     if not simulation:
         return []
     held = any(one.holdout is not None for one in simulation.values())
     rows, units, said = [], [], []
+    missing: dict[tuple[str, str], list[str]] = {}  # signals by their reason, and what it is of
     for name, one in simulation.items():
         scores = [one.fitted, *([one.holdout or without("")] if held else [])]
         shown = of_signal(name, axes).scaled([score.rmse for score in scores])
@@ -206,16 +207,19 @@ def free_simulation(simulation: Mapping[str, Simulated], axes: Axes) -> list[Tab
         units.append(shown.unit)
         for what, score in zip(("", " on what was not fitted"), scores):
             if score.reason:
-                said.append(f"No free simulation of the {in_sentence(shown.title)}{what}: {score.reason}.")
+                missing.setdefault((score.reason, what), []).append(in_sentence(shown.title))
         if one.at_fitted_offset is not None and math.isfinite(one.at_fitted_offset.rmse):
             size = shown.text(one.at_fitted_offset.rmse)
             said.append(
                 f"Held out, with the fitted recordings' offset instead of its own, the {in_sentence(shown.title)} "
                 f"is off by {size} rms."
             )
+    none = [
+        f"No free simulation of the {all_of(titles)}{what}: {reason}." for (reason, what), titles in missing.items()
+    ]
     head = ["rms error", "mean |e|", "of range"]
     head += ["held out: rms", "mean |e|", "of range"] if held else []
-    return [Table(head, rows, "free simulation", units), *([Lines(said)] if said else [])]
+    return [Table(head, rows, "free simulation", units), *([Lines([*none, *said])] if none or said else [])]
 
 
 def _score(score: Score, shown: Quantity) -> list[str]:

@@ -16,7 +16,7 @@ from emaviz.page.tab import Standing
 from emaviz.page.workspaces import Page
 from emaviz.session.campaigns import Campaigns
 from emaviz.session.inputs import Provenance
-from emaviz.session.worker import Worker
+from emaviz.session.jobs import Worker
 from emaviz.text.html import Html, add_html, html, joined, said
 
 # --- campaigns, below the recordings: which one, its progress, and the row that opens as a run ------------------------

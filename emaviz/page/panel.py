@@ -17,7 +17,7 @@ from emaviz.server.viser_private import Inside
 from emaviz.session.data_folder import DataFolder
 from emaviz.session.files import Practice
 from emaviz.session.inputs import Provenance
-from emaviz.session.worker import Job, Signal
+from emaviz.session.jobs import Job, Signal
 from emaviz.text.html import BOX, Html, add_html, boxed, html, joined
 from emaviz.text.results import begun, large, warned
 from emaviz.text.time_left import going_on

@@ -18,8 +18,8 @@ from emaviz.page.style import page as style
 from emaviz.page.workspaces import Page
 from emaviz.scene.actuator import ActuatorScene
 from emaviz.scene.playback import SPEEDS, Motion, Playback
+from emaviz.session.jobs import Signal
 from emaviz.session.settings import checked, limits, setting, taken
-from emaviz.session.worker import Signal
 from emaviz.text.html import add_html
 
 _SLOWEST_STEP_S = 1e-4

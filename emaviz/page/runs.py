@@ -30,8 +30,8 @@ from emaviz.session import saved as session_file
 from emaviz.session.compare import Comparing
 from emaviz.session.data_folder import SESSION_SUFFIX
 from emaviz.session.files import UPLOADED
+from emaviz.session.jobs import Worker
 from emaviz.session.saved import Part, Recorded
-from emaviz.session.worker import Worker
 from emaviz.text.html import Html, add_html, begin, boxed, html, joined, said
 
 # --- everything on the page as one file: saved to the data folder and to the browser, loaded from either --------------

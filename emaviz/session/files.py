@@ -28,7 +28,7 @@ from ema_model.recordings.side_file import SideFile, find_side_file
 from ema_model.text import InWords
 from emaviz.session.data_folder import ACTUATOR_SUFFIX, DataFolder
 from emaviz.session.inputs import digest, version_of
-from emaviz.session.worker import Job, Run, Signal
+from emaviz.session.jobs import Job, Run, Signal
 
 # --- a recording that is chosen for Compare: its table, its mapping, and what was measured ----------------------------
 

@@ -24,8 +24,8 @@ from ema_model.quantities.numbers import amount
 from ema_model.recordings import Measurement
 from ema_model.simulation import plant
 from emaviz.session.inputs import Inputs, Provenance
+from emaviz.session.jobs import Job, Run, Signal, Steps, Worker
 from emaviz.session.settings import SLIDERS, Settings, title
-from emaviz.session.worker import Job, Run, Signal, Steps, Worker
 
 if TYPE_CHECKING:
     from emaviz.recording.story import IdentificationStory

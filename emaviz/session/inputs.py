@@ -10,9 +10,9 @@ from typing import Any
 import msgspec
 
 from ema_model.recordings import side_path
+from emaviz.session.jobs import Job
 from emaviz.session.saved import Part
 from emaviz.session.settings import taken
-from emaviz.session.worker import Job
 
 _MOST_NAMES = 3
 

@@ -24,8 +24,8 @@ from ema_model.simulation import plant
 from ema_model.simulation.run import simulate_monitor, simulate_monitors
 from emaviz.session.identify import Identifying, inputs_of
 from emaviz.session.inputs import Inputs
+from emaviz.session.jobs import Signal, Worker, report
 from emaviz.session.settings import Settings
-from emaviz.session.worker import Signal, Worker, report
 
 # --- a fan ------------------------------------------------------------------------------------------------------------
 # The monitor model's response to one command under five severities of one fault, the other sliders as set.

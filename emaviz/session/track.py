@@ -30,9 +30,9 @@ from ema_model.tracking.track import check_thresholds
 from emaviz.session.data_folder import DataFolder
 from emaviz.session.files import Practice, side_file_of
 from emaviz.session.inputs import Inputs, Provenance, version_with_side
+from emaviz.session.jobs import RESTED, Job, Run, Signal, Stopped, Worker
 from emaviz.session.session import Session
 from emaviz.session.settings import number, taken
-from emaviz.session.worker import RESTED, Job, Run, Signal, Stopped, Worker
 
 # --- what a session's file holds of Track -----------------------------------------------------------------------------
 # What a session's file holds of Track: thresholds and identified flights, so that none is identified again.

@@ -24,9 +24,9 @@ from emaviz.session import files as session_files
 from emaviz.session.data_folder import DataFolder
 from emaviz.session.files import Practice, side_file_of
 from emaviz.session.inputs import Inputs, Provenance, digest, version_with_side
+from emaviz.session.jobs import Job, Run, Signal, Worker
 from emaviz.session.session import Session
 from emaviz.session.settings import taken
-from emaviz.session.worker import Job, Run, Signal, Worker
 
 # --- what a session's file holds of Units -----------------------------------------------------------------------------
 # What a session's file holds of Units: what is chosen, and the answer as it was found: nothing is run again.

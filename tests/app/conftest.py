@@ -13,7 +13,7 @@ from support.one_tab import Tab
 
 from emaviz.page.app import App
 from emaviz.session import compare
-from emaviz.session.worker import Worker
+from emaviz.session.jobs import Worker
 
 
 @pytest.fixture(scope="module")

@@ -15,9 +15,9 @@ from ema_model.actuator import load_actuator
 from ema_model.errors import InputError
 from emaviz.recording import read
 from emaviz.session.data_folder import DataFolder
+from emaviz.session.jobs import Worker
 from emaviz.session.session import Session
 from emaviz.session.track import Following
-from emaviz.session.worker import Worker
 
 COUNT = 20
 KNOWN = flights(0.02 * np.arange(COUNT + 5))

@@ -24,12 +24,12 @@ from emaviz.session.data_folder import DataFolder
 from emaviz.session.discover.discovering import Discovering
 from emaviz.session.discover.stories import Entry
 from emaviz.session.inputs import Inputs, Provenance, results_part
+from emaviz.session.jobs import Job, Worker
+from emaviz.session.jobs import Run as JobRun
 from emaviz.session.saved import Part
 from emaviz.session.session import Session
 from emaviz.session.track import Following
 from emaviz.session.units import ComparingUnits
-from emaviz.session.worker import Job, Worker
-from emaviz.session.worker import Run as JobRun
 
 FILES = {"bench": ("chirp.csv", "step.csv"), "fleet/a": ("sine.csv",), "fleet/b": ("sine.csv",)}
 

@@ -7,7 +7,7 @@ import threading
 from support.on_page import wait_until
 
 from ema_model.errors import InputError
-from emaviz.session.worker import Job, Pace, Worker
+from emaviz.session.jobs import Job, Pace, Worker
 
 
 class Heard:

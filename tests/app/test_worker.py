@@ -6,7 +6,7 @@ import itertools
 import threading
 import time
 
-from emaviz.session.worker import Worker
+from emaviz.session.jobs import Worker
 
 
 def wait_until(condition, seconds=5.0):

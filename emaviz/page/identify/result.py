@@ -24,7 +24,7 @@ from emaviz.page.tab import Standing
 from emaviz.page.workspaces import Page
 from emaviz.scene.playback import PLAYED, motion
 from emaviz.session.identify import Frame, Landscapes, Race, Track, ends
-from emaviz.session.worker import Worker
+from emaviz.session.jobs import Worker
 from emaviz.text.html import Html, add_html, begin, joined, note
 from emaviz.text.results import sure_words
 

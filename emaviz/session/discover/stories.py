@@ -29,7 +29,7 @@ from ema_model.quantities.numbers import number
 from ema_model.quantities.titles import in_sentence
 from emaviz.session.discover.source import DiscoverySource, Recipe, SavedStep, SavedStory, actuator_of, story_of
 from emaviz.session.inputs import Inputs, Provenance
-from emaviz.session.worker import RESTED, Job, Signal, Stopped, Tell
+from emaviz.session.jobs import RESTED, Job, Signal, Stopped, Tell
 
 # --- candidates refitted in the model of a story, each once -----------------------------------------------------------
 # Candidates refitted in the model of a story, each once; and the two between which a test would have to decide.

@@ -1,4 +1,4 @@
-"""The one compute thread, the jobs that it does one after another, and what they tell."""
+"""Jobs on the one compute thread, one after another: how far each is, its Pause and its Stop."""
 
 from __future__ import annotations
 

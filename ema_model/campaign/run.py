@@ -8,9 +8,9 @@ from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 
-from ema_model.campaign.execute import common
 from ema_model.campaign.kinds import KINDS
 from ema_model.campaign.plan import Plan
+from ema_model.campaign.rows import common
 from ema_model.campaign.schedulers import Died, Outcome, Scheduler
 from ema_model.campaign.store import Store, header_of, version
 from ema_model.campaign.task import Task

@@ -15,7 +15,7 @@ from contextlib import contextmanager, suppress
 from multiprocessing.connection import Connection, wait
 from typing import Any, Protocol
 
-from ema_model.campaign.execute import ENVIRONMENT, OtherVersion, execute
+from ema_model.campaign.rows import ENVIRONMENT, OtherVersion, row_of
 from ema_model.campaign.store import differences
 from ema_model.campaign.store import version as own_version
 from ema_model.campaign.task import Task
@@ -177,14 +177,14 @@ def _serve(connection: Connection, version: dict[str, str]) -> None:
     parent = multiprocessing.parent_process()
     assert parent is not None
     end_with_parent(parent.join)
-    from ema_model.campaign.execute import execute
+    from ema_model.campaign.rows import row_of
 
     with suppress(EOFError, OSError):
         connection.send(None)
         while True:
             task = connection.recv()
             try:
-                answer: Any = execute(task, version)
+                answer: Any = row_of(task, version)
             except OtherVersion as error:
                 answer = error
             connection.send(answer)
@@ -284,7 +284,7 @@ class Cluster:
         while left:
             room = max(2, _CLUSTER_AHEAD * self.workers) - len(given)
             for _, task in zip(range(room), rest):  # in this order: it takes no task too many
-                future = self._client.submit(execute, task, version, key=f"emaviz-{task.name}")
+                future = self._client.submit(row_of, task, version, key=f"emaviz-{task.name}")
                 given[future.key] = task, future
                 future.add_done_callback(done.put)
             found = []

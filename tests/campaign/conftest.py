@@ -8,13 +8,13 @@ import numba
 import pytest
 
 from ema_model import kernel_cache
-from ema_model.campaign.execute import ENVIRONMENT
+from ema_model.campaign.rows import ENVIRONMENT
 from ema_model.simulation import compiled
 
 
 @pytest.fixture(autouse=True)
 def _as_before(monkeypatch):
-    """What `execute.prepare` sets for a worker's process, taken back."""
+    """What `rows.prepare` sets for a worker's process, taken back."""
     for name in ENVIRONMENT:
         monkeypatch.setenv(name, os.environ.get(name, ""))
         if not os.environ[name]:

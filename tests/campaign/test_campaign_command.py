@@ -16,7 +16,7 @@ from support.documents import result_of
 
 from ema_model.campaign import Store, load_plan, run_plan
 from ema_model.campaign import store as storing
-from ema_model.campaign.execute import execute
+from ema_model.campaign.rows import row_of
 from ema_model.campaign.store import version
 from ema_model.errors import InputError
 from emaviz.cli import main
@@ -29,7 +29,7 @@ class Here:
 
     def outcomes(self, tasks, version):
         for task in tasks:
-            yield [(task, execute(task, version))]
+            yield [(task, row_of(task, version))]
 
 
 @pytest.fixture(scope="module")
@@ -258,5 +258,5 @@ def test_the_table_says_nothing_of_how_it_came_about(folder):
     row = table.to_pylist()[0]
     task = Store(folder).task(row)
     assert task.name == row["name"]
-    again = execute(task, version())
+    again = row_of(task, version())
     assert all(again[name] == row[name] for name in table.schema.names)

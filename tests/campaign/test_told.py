@@ -8,9 +8,9 @@ import pytest
 from support.cheap_plans import written
 
 from ema_model.campaign import Store, load_plan
-from ema_model.campaign.execute import common
 from ema_model.campaign.kinds.discover import tally
 from ema_model.campaign.kinds.identify import covered
+from ema_model.campaign.rows import common
 from ema_model.campaign.store import header_of, summaries
 from ema_model.faults import HEALTHY, NAMES
 from emaviz.report.campaign import write_campaign_report

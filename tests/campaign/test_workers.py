@@ -10,8 +10,8 @@ from processes import environment
 from support.cheap_plans import cheap
 
 from ema_model.campaign import load_plan
-from ema_model.campaign.execute import OtherVersion, execute
 from ema_model.campaign.one_compiler import Turns
+from ema_model.campaign.rows import OtherVersion, row_of
 from ema_model.campaign.schedulers import Processes
 from ema_model.campaign.store import version
 from ema_model.simulation import compiled
@@ -20,7 +20,7 @@ COMPILES = """
 import sys
 from pathlib import Path
 from numba.core import event
-from ema_model.campaign.execute import prepare
+from ema_model.campaign.rows import prepare
 prepare()
 from ema_model.commands import command
 from ema_model.actuator import load_actuator
@@ -102,7 +102,7 @@ def test_what_is_compiled_does_not_choose_the_kernels(monkeypatch):
 def test_a_worker_of_another_version_computes_nothing(tmp_path):
     (task,) = load_plan(cheap(tmp_path, 1)).tasks
     with pytest.raises(OtherVersion, match=r"differs from the campaign: emaviz .* / 0\.0\.9"):
-        execute(task, version() | {"emaviz": "0.0.9"})
+        row_of(task, version() | {"emaviz": "0.0.9"})
 
 
 @pytest.mark.parametrize("asked", [1, 3, None])

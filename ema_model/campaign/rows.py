@@ -1,4 +1,4 @@
-"""One task in a worker's process: from the frozen description to a row, whatever goes wrong on the way."""
+"""How a row of a campaign is made: one task, computed in a worker's process, whatever goes wrong on the way."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ class OtherVersion(RuntimeError):
     """A worker that computes with other sources or libraries than the campaign's."""
 
 
-def execute(task: Any, version: dict[str, str]) -> dict[str, Any]:
+def row_of(task: Any, version: dict[str, str]) -> dict[str, Any]:
     """The task's row: its answer, or the error in one line, and how it came about.
 
     Raises OtherVersion where this process does not compute what the campaign asks for.

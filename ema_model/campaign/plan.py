@@ -13,9 +13,9 @@ from typing import Any
 import msgspec
 
 from ema_model.actuator import Actuator, actuator_text, parse_actuator, shipped
-from ema_model.campaign import axes as plan_axes
-from ema_model.campaign.axes import AXES, MOST_TASKS, USUAL, Choice, check_count, choices_of, digest, run_of
+from ema_model.campaign import plan_axes
 from ema_model.campaign.kinds import KINDS
+from ema_model.campaign.plan_axes import AXES, MOST_TASKS, USUAL, Choice, check_count, choices_of, digest, run_of
 from ema_model.campaign.task import Excitation, File, Recorded, Simulated, Task
 from ema_model.errors import InputError, quoted
 from ema_model.files.opened import TEXT_BYTES, listed, open_user_file, shipped_folder

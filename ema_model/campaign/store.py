@@ -29,7 +29,7 @@ from ema_model.files.written import FileLock, remove_abandoned, whole_file
 
 _PACKAGE = Path(__file__).parents[1]
 _LIBRARIES = ("numpy", "scipy", "numba", "llvmlite")
-_OF_A_RESULT = ("task.py", "given.py", "showable.py", "kinds/")  # of this folder; the rest only moves tasks and rows
+_OF_A_RESULT = ("task.py", "plan_axes.py", "kinds/")  # of this folder; the rest only moves tasks and rows
 
 
 @cache

@@ -9,8 +9,8 @@ from typing import Any
 
 import msgspec
 
-from ema_model.campaign.axes import Given, given
 from ema_model.campaign.kinds import KINDS
+from ema_model.campaign.plan_axes import TaskInputs, inputs_of
 from ema_model.campaign.store import Store
 from ema_model.campaign.task import Task
 from ema_model.comparison import compare
@@ -78,7 +78,7 @@ class Campaigns:
 
     def _work(self, task: Task, tell: Tell) -> None:
         tell(f"{_named(task)}: making its recordings")
-        it = given(task)
+        it = inputs_of(task)
         path = self._path(task)
         _RECORDED[task.kind](task, it, path, tell)
         self._recorded = path, it.fitted[0], f"{path.name}: {_named(task)}"
@@ -104,7 +104,7 @@ def _configuration(task: Task) -> dict[str, Any]:
     return {"group": task.group, "case": task.case, "seed": task.seed, "task": task.name, **task.settings}
 
 
-def _identified(task: Task, it: Given, path: Path, tell: Tell) -> None:
+def _identified(task: Task, it: TaskInputs, path: Path, tell: Tell) -> None:
     from emaviz.recording.story import IdentificationStory
 
     own = msgspec.convert(task.settings, KINDS["identify"].settings)
@@ -135,7 +135,7 @@ def _identified(task: Task, it: Given, path: Path, tell: Tell) -> None:
         raise InputError(story.failed)
 
 
-def _compared(task: Task, it: Given, path: Path, tell: Tell) -> None:
+def _compared(task: Task, it: TaskInputs, path: Path, tell: Tell) -> None:
     from emaviz.recording.comparison import write_comparison
 
     own = msgspec.convert(task.settings, KINDS["compare"].settings)
@@ -143,7 +143,7 @@ def _compared(task: Task, it: Given, path: Path, tell: Tell) -> None:
     write_comparison(found, path, _configuration(task))
 
 
-def _discovered(task: Task, it: Given, path: Path, tell: Tell) -> None:
+def _discovered(task: Task, it: TaskInputs, path: Path, tell: Tell) -> None:
     from emaviz.recording.discovery import write_discovery
 
     own = msgspec.convert(task.settings, KINDS["discover"].settings)

@@ -10,8 +10,8 @@ from support.on_page import wait_until
 
 from ema_model.actuator import load_actuator
 from ema_model.campaign import load_plan
-from ema_model.campaign.axes import given
 from ema_model.campaign.kinds import KINDS
+from ema_model.campaign.plan_axes import inputs_of
 from ema_model.campaign.rows import common
 from ema_model.campaign.store import Store, header_of
 from ema_model.errors import InputError
@@ -42,7 +42,7 @@ def computed(folder, at):
     for task in plan.tasks:
         kind = KINDS[task.kind]
         settings = kind.settings(**task.settings)
-        store.append(task.kind, [common(task) | kind.run(given(task), settings, task.seed)])
+        store.append(task.kind, [common(task) | kind.run(inputs_of(task), settings, task.seed)])
     store.close()
     return Store(folder)
 

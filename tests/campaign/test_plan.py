@@ -13,8 +13,8 @@ from support.hidden_effects import ACTUATOR, plant
 from support.hidden_effects import recorded as by_hand
 
 from ema_model.campaign import load_plan, shipped_plans
-from ema_model.campaign.axes import effects_of, given
 from ema_model.campaign.kinds import KINDS
+from ema_model.campaign.plan_axes import effects_of, inputs_of
 from ema_model.campaign.task import from_json, text_hash
 from ema_model.effects import CATALOGUE
 from ema_model.errors import InputError
@@ -76,7 +76,7 @@ def test_a_plant_is_the_one_that_the_studies_draw():
     short = [(name, settings, 0.05) for name, settings, _ in commands]
     expected = by_hand(task.seed, commands=short, effects=effects)
     runs = tuple(replace(one, duration_s=0.05) for one in task.simulated.runs)
-    found = given(replace(task, simulated=replace(task.simulated, runs=runs, holdout=())))
+    found = inputs_of(replace(task, simulated=replace(task.simulated, runs=runs, holdout=())))
     for one, other in zip(found.fitted, expected):
         for name in other.signals:
             np.testing.assert_allclose(one[name], other[name], rtol=1e-9, atol=1e-9)
@@ -134,8 +134,8 @@ def test_a_users_own_law_is_hidden(tmp_path):
     plan = load_plan(
         written(tmp_path, '[groups.own]\nCHEAP\neffects = { user_torque = { expression = "-c*omega", c = 1e-3 } }\n')
     )
-    with_it = given(plan.tasks[0])
-    without = given(replace(plan.tasks[0], simulated=replace(plan.tasks[0].simulated, effects={})))
+    with_it = inputs_of(plan.tasks[0])
+    without = inputs_of(replace(plan.tasks[0], simulated=replace(plan.tasks[0].simulated, effects={})))
     assert not np.allclose(with_it.fitted[0]["current_A"], without.fitted[0]["current_A"])
 
 
@@ -144,7 +144,7 @@ def recordings(tmp_path):
     folder = tmp_path / "logs [1]"
     folder.mkdir()
     plan = written(tmp_path, "[groups.one]\nCHEAP\n")
-    one = given(load_plan(plan).tasks[0]).fitted[0]
+    one = inputs_of(load_plan(plan).tasks[0]).fitted[0]
     for number, name in enumerate(("a", "b", "c")):
         rows = zip(*(one[column][number:] for column in one.signals))
         lines = [",".join(one.signals), *(",".join(f"{value:.9g}" for value in row) for row in rows)]
@@ -159,12 +159,12 @@ def test_each_file_of_a_pattern_is_a_task(recordings):
     )
     plan = load_plan(path)
     assert [task.case for task in plan.tasks] == ["a.csv", "b.csv", "c.csv", "a.csv + b.csv"]
-    assert given(plan.tasks[0]).fitted[0].samples == 501
-    assert len(given(plan.tasks[3]).held) == 1
+    assert inputs_of(plan.tasks[0]).fitted[0].samples == 501
+    assert len(inputs_of(plan.tasks[3]).held) == 1
     whole = (recordings / "c.csv").read_bytes()
     (recordings / "c.csv").write_bytes((recordings / "a.csv").read_bytes())
     with pytest.raises(InputError, match=r"c: is both fitted and held out \(its content is that of a\)"):
-        given(load_plan(path).tasks[3])
+        inputs_of(load_plan(path).tasks[3])
     (recordings / "c.csv").write_bytes(whole)
     copy = recordings.parent / "copy.toml"
     copy.write_text(plan.text)
@@ -200,7 +200,7 @@ def test_a_recording_that_changed_is_another_task_and_the_old_one_says_so(record
     (after,) = load_plan(path).tasks
     assert before.name != after.name
     with pytest.raises(InputError, match=r"a\.csv: has changed since"):
-        given(before)
+        inputs_of(before)
 
 
 GROUP = "[groups.g]\nCHEAP\n"

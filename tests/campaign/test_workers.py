@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+import shutil
 import subprocess
 import sys
 
@@ -9,13 +11,14 @@ import pytest
 from processes import environment
 from support.cheap_plans import cheap
 
-from ema_model.campaign import load_plan
+from ema_model.campaign import load_plan, store
 from ema_model.campaign.one_compiler import Turns
 from ema_model.campaign.rows import OtherVersion, row_of
 from ema_model.campaign.schedulers import Processes
 from ema_model.campaign.store import version
 from ema_model.simulation import compiled
 
+IMPORTED = re.compile(r"from ema_model\.campaign\.(\w+) import")
 COMPILES = """
 import sys
 from pathlib import Path
@@ -103,6 +106,27 @@ def test_a_worker_of_another_version_computes_nothing(tmp_path):
     (task,) = load_plan(cheap(tmp_path, 1)).tasks
     with pytest.raises(OtherVersion, match=r"differs from the campaign: emaviz .* / 0\.0\.9"):
         row_of(task, version() | {"emaviz": "0.0.9"})
+
+
+def test_the_version_follows_every_file_that_a_result_depends_on(tmp_path, monkeypatch):
+    shutil.copytree(store._PACKAGE / "campaign", tmp_path / "campaign")
+    monkeypatch.setattr(store, "_PACKAGE", tmp_path)
+    before = version.__wrapped__()["sources"]
+    for file in _behind_a_result(tmp_path / "campaign"):
+        text = file.read_text(encoding="utf-8")
+        file.write_text(text + "# changed\n", encoding="utf-8")
+        assert version.__wrapped__()["sources"] != before, f"another {file.name} gives other rows"
+        file.write_text(text, encoding="utf-8")
+
+
+def _behind_a_result(folder):
+    """The kinds of tasks, and what they import of the campaign's folder."""
+    files, new = set(), set((folder / "kinds").glob("*.py"))
+    while new:
+        files |= new
+        named = {name for file in new for name in IMPORTED.findall(file.read_text(encoding="utf-8"))}
+        new = {folder / f"{name}.py" for name in named if (folder / f"{name}.py").exists()} - files
+    return sorted(files)
 
 
 @pytest.mark.parametrize("asked", [1, 3, None])

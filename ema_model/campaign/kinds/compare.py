@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 import pyarrow as pa
 
-from ema_model.campaign.axes import Given
 from ema_model.campaign.kinds.kind import FLAG, NUMBER, NUMBERS, TEXT, Kind
+from ema_model.campaign.plan_axes import TaskInputs
 from ema_model.comparison import as_dict, compare
 
 
@@ -21,8 +21,8 @@ class Settings:
     calibrate: bool = True
 
 
-def _run(given: Given, settings: Settings, seed: int) -> dict[str, Any]:
-    found = as_dict(compare(given.fitted, given.actuator, calibrate=settings.calibrate, holdout=given.held))
+def _run(inputs: TaskInputs, settings: Settings, seed: int) -> dict[str, Any]:
+    found = as_dict(compare(inputs.fitted, inputs.actuator, calibrate=settings.calibrate, holdout=inputs.held))
     first = next((one for one in found["explained_by"] if one["significant"]), {})
     error, calibration = found["signals"][found["primary"]], found["calibration"]
     return {

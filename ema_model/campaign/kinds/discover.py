@@ -12,8 +12,8 @@ import numpy as np
 import pyarrow as pa
 
 from ema_model.actuator import Actuator
-from ema_model.campaign.axes import Given
 from ema_model.campaign.kinds.kind import FLAG, NUMBER, NUMBERS, TEXT, TEXTS, Kind
+from ema_model.campaign.plan_axes import TaskInputs
 from ema_model.comparison.compare import weights_of
 from ema_model.comparison.criteria import BAND
 from ema_model.discovery import as_dict, discover
@@ -65,15 +65,17 @@ class Settings:
             raise InputError(f"most_effects is a whole number from 0 to 100, not {self.most_effects}")
 
 
-def _run(given: Given, settings: Settings, seed: int) -> dict[str, Any]:
+def _run(inputs: TaskInputs, settings: Settings, seed: int) -> dict[str, Any]:
     signals = _SIGNALS[settings.signals]
     asked: dict[str, Any] = {"signals": settings.signals, "showable": None}
-    if settings.showable_from > 0.0 and given.effects:
-        asked["showable"] = showable(given.fitted, given.actuator, given.effects, signals)
+    if settings.showable_from > 0.0 and inputs.effects:
+        asked["showable"] = showable(inputs.fitted, inputs.actuator, inputs.effects, signals)
         if asked["showable"] < settings.showable_from:
             return asked
     found = as_dict(
-        discover(given.fitted, given.actuator, holdout=given.held, signals=signals, most_effects=settings.most_effects)
+        discover(
+            inputs.fitted, inputs.actuator, holdout=inputs.held, signals=signals, most_effects=settings.most_effects
+        )
     )
     ladder, faults, experiment = found["ladder"], found["faults"], found["next_experiment"]
     unknown, calibrated = found["unknown"], found["calibration"]["parameters"]

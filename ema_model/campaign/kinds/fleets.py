@@ -15,8 +15,8 @@ import numpy as np
 import pyarrow as pa
 
 from ema_model.actuator import Actuator
-from ema_model.campaign.axes import Given
 from ema_model.campaign.kinds.kind import FLAG, NUMBER, TEXTS, Kind
+from ema_model.campaign.plan_axes import TaskInputs
 from ema_model.errors import InputError
 from ema_model.fleets import RUNS, UNSEEN, Fleet, draw, recorded
 from ema_model.recordings import Measurement
@@ -53,8 +53,8 @@ def fleet_of(settings: Settings, actuator: Actuator, seed: int) -> Fleet:
     )
 
 
-def _run(given: Given, settings: Settings, seed: int) -> dict[str, Any]:
-    fleet = fleet_of(settings, given.actuator, seed)
+def _run(inputs: TaskInputs, settings: Settings, seed: int) -> dict[str, Any]:
+    fleet = fleet_of(settings, inputs.actuator, seed)
     unseen = tuple(UNSEEN) if settings.holdout else ()
     fitted: dict[str, list[Measurement]] = {}
     held: dict[str, list[Measurement]] = {}
@@ -63,7 +63,7 @@ def _run(given: Given, settings: Settings, seed: int) -> dict[str, Any]:
         fitted[name] = [every[run] for run in fleet.runs]
         held[name] = [every[run] for run in unseen]
     begun = perf_counter()
-    found = compare_units(fitted, given.actuator, holdout=held, seed=seed)
+    found = compare_units(fitted, inputs.actuator, holdout=held, seed=seed)
     return scored(fleet, found) | {"answer_s": perf_counter() - begun}
 
 

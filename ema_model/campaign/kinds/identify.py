@@ -10,8 +10,8 @@ import numpy as np
 import pyarrow as pa
 
 from ema_model import faults
-from ema_model.campaign.axes import Given
 from ema_model.campaign.kinds.kind import FLAG, NUMBER, NUMBERS, TEXT, TEXTS, Kind
+from ema_model.campaign.plan_axes import TaskInputs
 from ema_model.errors import InputError, quoted
 from ema_model.identification.run import ALGORITHMS, ROBUST, identify
 from ema_model.identification.search import Objective
@@ -42,10 +42,10 @@ class Settings:
             raise InputError("population is from 2 to 100000, iterations from 1 to 1000000")
 
 
-def _run(given: Given, settings: Settings, seed: int) -> dict[str, Any]:
+def _run(inputs: TaskInputs, settings: Settings, seed: int) -> dict[str, Any]:
     objective, held = (
-        Objective(one, given.actuator, circuit=settings.circuit, fitness=settings.fitness) if one else None
-        for one in (given.fitted, given.held)
+        Objective(one, inputs.actuator, circuit=settings.circuit, fitness=settings.fitness) if one else None
+        for one in (inputs.fitted, inputs.held)
     )
     assert objective is not None
     answer = identify(
@@ -54,7 +54,7 @@ def _run(given: Given, settings: Settings, seed: int) -> dict[str, Any]:
         population=settings.population,
         iterations=settings.iterations,
         seed=seed,
-        truth=given.truth,
+        truth=inputs.truth,
         parameters_known=settings.parameters_known,
         polish=settings.polish,
     )
@@ -69,8 +69,8 @@ def _run(given: Given, settings: Settings, seed: int) -> dict[str, Any]:
         **{f"{name}_high": float(value) for name, value in zip(faults.NAMES, high)},
         "error_percent": answer.error_percent,
         "error_wrapped_percent": None
-        if given.truth is None
-        else faults.error_percent(answer.k, given.truth, wrap=True),
+        if inputs.truth is None
+        else faults.error_percent(answer.k, inputs.truth, wrap=True),
         "rmse_A": answer.rmse,
         "holdout_rmse_A": None if held is None else float(held(answer.k)[0]),
         "healthy": bool(sure.healthy),
@@ -80,8 +80,8 @@ def _run(given: Given, settings: Settings, seed: int) -> dict[str, Any]:
         "evaluations": int(answer.evaluations),
         "rmse_history_A": answer.rmse_history.tolist(),
         "error_history_percent": None
-        if given.truth is None
-        else [faults.error_percent(k, given.truth) for k in answer.k_history],
+        if inputs.truth is None
+        else [faults.error_percent(k, inputs.truth) for k in answer.k_history],
         "answer_s": answer.elapsed_s,
     }
 

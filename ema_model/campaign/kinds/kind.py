@@ -8,7 +8,7 @@ from typing import Any
 
 import pyarrow as pa
 
-from ema_model.campaign.axes import Given
+from ema_model.campaign.plan_axes import TaskInputs
 
 TEXT, NUMBER, FLAG = pa.string(), pa.float64(), pa.bool_()
 TEXTS, NUMBERS = pa.list_(pa.string()), pa.list_(pa.float64())
@@ -41,14 +41,14 @@ HOW = pa.schema(  # how a row came about, which is another each time: in the par
 class Kind:
     """A kind of task.
 
-    run(given, settings, seed) gives a value for each of `columns`, which depends on its arguments only, and of `HOW`
+    run(inputs, settings, seed) gives a value for each of `columns`, which depends on its arguments only, and of `HOW`
     what it knows; it raises InputError or FloatingPointError for what cannot be computed.
     """
 
     title: str
     settings: type[Any]  # a frozen dataclass: each field is an option of a plan's group, and may be an axis
     columns: pa.Schema
-    run: Callable[[Given, Any, int], dict[str, Any]]
+    run: Callable[[TaskInputs, Any, int], dict[str, Any]]
     seconds: Callable[[Any], float]  # about how long one takes on one core, from its settings
     told: Callable[[list[dict[str, Any]]], dict[str, Any]]  # what rows without errors say together, by its title
     from_recordings: bool = True  # else it makes all that it needs from its settings and the seed

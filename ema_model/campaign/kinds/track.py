@@ -15,8 +15,8 @@ from typing import Any
 import numpy as np
 import pyarrow as pa
 
-from ema_model.campaign.axes import Given
 from ema_model.campaign.kinds.kind import NUMBER, NUMBERS, TEXT, TEXTS, Kind
+from ema_model.campaign.plan_axes import TaskInputs
 from ema_model.errors import InputError, quoted
 from ema_model.faults import NAMES
 from ema_model.lives import LAWS, Life, drawn, healthy_life, worn_life
@@ -74,7 +74,7 @@ def places(first: int, last: int, lambdas: Sequence[float]) -> list[int]:
     return [min(last - 1, first + round(share * (last - first))) for share in lambdas]
 
 
-def _run(given: Given, settings: Settings, seed: int) -> dict[str, Any]:
+def _run(inputs: TaskInputs, settings: Settings, seed: int) -> dict[str, Any]:
     life = life_of(settings, seed)
     last = life.flights - 1
     tracker = Tracker({life.fault: life.threshold} if life.fault else {}, seed)

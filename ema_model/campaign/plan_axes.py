@@ -1,4 +1,4 @@
-"""Axes of a plan and what is drawn along them."""
+"""Axes of a plan, what is drawn along them, and what a task works on: its actuator and its recordings."""
 
 from __future__ import annotations
 
@@ -135,7 +135,7 @@ _NEXT_NOISE = 7  # from one recording's seed to the next one's
 
 
 @dataclass(frozen=True)
-class Given:
+class TaskInputs:
     """What a kind of task gets."""
 
     actuator: Actuator  # as its file says: what is fitted
@@ -145,7 +145,7 @@ class Given:
     effects: Mapping[str, Mapping[str, float]] = field(default_factory=dict)  # hidden in it
 
 
-def given(task: Task) -> Given:
+def inputs_of(task: Task) -> TaskInputs:
     """Reads or simulates; InputError and FloatingPointError as those do."""
     actuator = _actuator(task.actuator)
     if task.recorded is not None:
@@ -154,13 +154,13 @@ def given(task: Task) -> Given:
             for files in (task.recorded.files, task.recorded.holdout)
         )
         check_held_out(fitted, held)
-        return Given(actuator, fitted, held)
+        return TaskInputs(actuator, fitted, held)
     if task.simulated is None:
-        return Given(actuator, [], [])
+        return TaskInputs(actuator, [], [])
     source = task.simulated
     fitted, held = (recorded(source, runs, actuator) for runs in (source.runs, source.holdout))
     check_held_out(fitted, held)
-    return Given(actuator, fitted, held, vector(source.faults), effects_of(source.effects))
+    return TaskInputs(actuator, fitted, held, vector(source.faults), effects_of(source.effects))
 
 
 def recorded(source: Simulated, runs: Sequence[Excitation], actuator: Actuator) -> list[Measurement]:

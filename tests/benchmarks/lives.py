@@ -23,8 +23,8 @@ from life_peers import Array, Quantiles, exponential_fit, particle_filter
 from ema_model import faults
 from ema_model.campaign.kinds.track import ALPHA, LAMBDA, LAMBDAS, Told, places
 from ema_model.estimation.problem import ECCENTRICITY, to_vector
-from ema_model.lives import LAWS, Life, drawn, worn_life
-from ema_model.lives.life import ONSET, POWER, base_of
+from ema_model.simulated_lives import LAWS, Life, drawn, worn_life
+from ema_model.simulated_lives.life import ONSET, POWER, base_of
 from ema_model.tracking.flights import Flight
 from ema_model.tracking.series import Unit
 from ema_model.tracking.track import Tracker
@@ -96,7 +96,7 @@ def _oracles(
 
 
 def _all_of(name: str, law: Law, flown: int) -> list[Law]:
-    """What a life of a law may be, as `ema_model.lives` draws it, of which so many flights were seen."""
+    """What a life of a law may be, as `ema_model.simulated_lives` draws it, of which so many flights were seen."""
     if name == "accelerating":
         return [replace(law, power=power) for power in np.linspace(*POWER, POWERS).tolist()]
     if name == "onset":

@@ -10,8 +10,8 @@ import pytest
 from ema_model.actuator import load_actuator
 from ema_model.campaign.kinds.fleets import KIND, Settings, scored
 from ema_model.errors import InputError
-from ema_model.fleets import Difference as True_
-from ema_model.fleets import draw
+from ema_model.simulated_fleets import Difference as True_
+from ema_model.simulated_fleets import draw
 from ema_model.units.result import Difference, OfType, Transfer, UnitsCompared
 
 ACTUATOR = load_actuator()

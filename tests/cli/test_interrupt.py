@@ -218,7 +218,7 @@ ema_model.discovery.discover = discover
 """
 TRACK = """
 import sys, time
-from ema_model.lives import drawn, worn_life
+from ema_model.simulated_lives import drawn, worn_life
 from ema_model.tracking import flights
 
 def identify_all(*_):

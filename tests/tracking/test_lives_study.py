@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from support.studied import studied
 
-from ema_model.lives import LAWS
+from ema_model.simulated_lives import LAWS
 
 pytestmark = pytest.mark.study
 

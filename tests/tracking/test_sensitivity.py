@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ema_model.lives.life import WORN_AT, accuracy
+from ema_model.simulated_lives.life import WORN_AT, accuracy
 from ema_model.tracking.series import growth
 
 

@@ -9,7 +9,7 @@ import pytest
 from support.flights import flights
 
 from ema_model.errors import InputError
-from ema_model.lives import drawn, healthy_life, worn_life
+from ema_model.simulated_lives import drawn, healthy_life, worn_life
 from ema_model.tracking.flights import Flight
 from ema_model.tracking.summary import as_dict
 from ema_model.tracking.track import Tracker, track

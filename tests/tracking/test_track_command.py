@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 from support.documents import result_of
 
-from ema_model.lives import drawn, worn_life
+from ema_model.simulated_lives import drawn, worn_life
 from emaviz.cli import main
 
 

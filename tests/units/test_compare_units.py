@@ -10,8 +10,8 @@ import pytest
 
 from ema_model.actuator import load_actuator, save_actuator
 from ema_model.estimation import calibrate
-from ema_model.fleets import draw, recorded
 from ema_model.recordings import Measurement
+from ema_model.simulated_fleets import draw, recorded
 from ema_model.units import fit as fitting
 from ema_model.units.block import linearised, unit_of, wider
 from ema_model.units.compare import compare_units

@@ -7,7 +7,7 @@ from dataclasses import replace
 import pytest
 
 from ema_model.actuator import load_actuator
-from ema_model.fleets import draw, recorded
+from ema_model.simulated_fleets import draw, recorded
 from ema_model.units.discovery import discover_units, sentences
 
 ACTUATOR = load_actuator()

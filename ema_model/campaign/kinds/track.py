@@ -19,7 +19,7 @@ from ema_model.campaign.kinds.kind import NUMBER, NUMBERS, TEXT, TEXTS, Kind
 from ema_model.campaign.plan_axes import TaskInputs
 from ema_model.errors import InputError, quoted
 from ema_model.faults import NAMES
-from ema_model.lives import LAWS, Life, drawn, healthy_life, worn_life
+from ema_model.simulated_lives import LAWS, Life, drawn, healthy_life, worn_life
 from ema_model.tracking.track import TRACKED, Tracker
 
 ALPHA, LAMBDA = 0.2, 0.5

@@ -9,16 +9,16 @@ import numpy as np
 
 from ema_model import faults
 from ema_model.actuator import Actuator
-from ema_model.lives import Life, recorded, worn_life
 from ema_model.practice.kinds.kind import Kind, Progress, Revealed, Truth
 from ema_model.quantities.titles import in_sentence
 from ema_model.recordings import write_measurement
+from ema_model.simulated_lives import Life, recorded, worn_life
 from ema_model.text import InWords
 from ema_model.tracking.result import Tracked
 
 
 class OneLife(Kind):
-    """The truth has a seed, a law and a fault of `ema_model.lives`, and how many flights are recorded."""
+    """The truth has a seed, a law and a fault of `ema_model.simulated_lives`, and how many flights are recorded."""
 
     def make(self, truth: Truth, actuator: Actuator, folder: Path, tell: Progress) -> None:
         """A file for each flight."""

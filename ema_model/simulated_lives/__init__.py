@@ -4,6 +4,6 @@ A life is drawn from a seed.  Its flights are recordings of the three-phase mode
 from what identifications of such recordings were found to be able to tell (`drawn`), thousands of lives in minutes.
 """
 
-from ema_model.lives.life import LAWS, Life, drawn, healthy_life, recorded, worn_life
+from ema_model.simulated_lives.life import LAWS, Life, drawn, healthy_life, recorded, worn_life
 
 __all__ = ["LAWS", "Life", "drawn", "healthy_life", "recorded", "worn_life"]

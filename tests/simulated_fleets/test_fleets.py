@@ -10,9 +10,9 @@ import pytest
 
 from ema_model.actuator import load_actuator
 from ema_model.errors import InputError
-from ema_model.fleets import RUNS, draw, recorded
-from ema_model.fleets.fleet import TRUTH, own, read_truth, told, write
 from ema_model.recordings import read
+from ema_model.simulated_fleets import RUNS, draw, recorded
+from ema_model.simulated_fleets.fleet import TRUTH, own, read_truth, told, write
 
 ACTUATOR = load_actuator()
 
@@ -83,6 +83,6 @@ def test_a_fleet_as_a_folder(tmp_path):
     with pytest.raises(InputError, match="not empty"):
         write(fleet, folder)
     found = subprocess.run(
-        [sys.executable, "-m", "ema_model.fleets", str(folder)], capture_output=True, text=True, check=True
+        [sys.executable, "-m", "ema_model.simulated_fleets", str(folder)], capture_output=True, text=True, check=True
     )
     assert fleet.differences[0].parameter in found.stdout

@@ -3,6 +3,6 @@
 A fleet is drawn from a seed; its recordings are the three-phase model's, with sensors' noise.
 """
 
-from ema_model.fleets.fleet import RUNS, UNSEEN, Difference, Fleet, draw, recorded
+from ema_model.simulated_fleets.fleet import RUNS, UNSEEN, Difference, Fleet, draw, recorded
 
 __all__ = ["RUNS", "UNSEEN", "Difference", "Fleet", "draw", "recorded"]

@@ -31,6 +31,8 @@ from ema_model.discovery.steps.begin import with_fitted_effects
 from ema_model.effects import find
 from ema_model.errors import InputError, quoted
 from ema_model.faults import vector
+from ema_model.fleet.compare import compare_units as compared_units
+from ema_model.fleet.result import UnitsCompared
 from ema_model.identification import run as identification
 from ema_model.identification.run import ROBUST, Identification, Progress
 from ema_model.identification.search import Objective
@@ -43,8 +45,6 @@ from ema_model.simulation.run import Run
 from ema_model.tracking import track as tracking
 from ema_model.tracking.flights import check_enough, check_order, flights_in, identified
 from ema_model.tracking.result import Tracked
-from ema_model.units.compare import compare_units as compared_units
-from ema_model.units.result import UnitsCompared
 
 __all__ = [
     "InputError",

@@ -25,7 +25,7 @@ FLOORS = {
         ["estimation"],
         ["identification", "comparison", "challenges"],
         ["discovery", "tracking"],
-        ["simulated_lives", "units"],
+        ["simulated_lives", "fleet"],
         ["simulated_fleets"],
         ["practice"],
         ["campaign"],

@@ -20,14 +20,14 @@ from ema_model.commands import command
 from ema_model.errors import InputError
 from ema_model.files.opened import shown
 from ema_model.files.written import whole_file
+from ema_model.fleet.block import linearised, pooled, unit_of
 from ema_model.recordings import Measurement, write_measurement
 from ema_model.recordings.measurement import Sensors
 from ema_model.simulation.run import Run, simulate_reference
-from ema_model.units.block import linearised, pooled, unit_of
 
 # --- how well the recordings of one unit tell each of its parameters, and which are only known together ---------------
 # It is what a fit of that unit alone leaves open, at the file's values, with the file's tolerances as all else that
-# is known: the covariance is (G + 1)⁻¹ in tolerances, G as of `units.block`.
+# is known: the covariance is (G + 1)⁻¹ in tolerances, G as of `fleet.block`.
 
 _LENGTH_S = 0.4
 RUNS = {

@@ -214,8 +214,8 @@ def _severities(random: np.random.Generator, variation: float, count: int) -> Ar
 # --- how well an identification of each profile tells k ---------------------------------------------------------------
 # How well an identification of each profile tells k, found once by identifying recordings of the three-phase model.
 #
-# `python -m ema_model.simulated_lives` makes assets/lives/accuracy.npz anew, in some minutes: for each profile, of the healthy
-# actuator and of one with each fault, the own covariance and what the base parameters move (`tracking.flight`).
+# `python -m ema_model.simulated_lives` makes assets/lives/accuracy.npz anew, in some minutes: for each profile, of the
+# healthy actuator and of one with each fault, the own covariance and what the base parameters move (`tracking.flight`).
 
 WORN_AT = 0.3  # from healthy, of the fault of each state
 STATES: tuple[dict[str, float], ...] = (

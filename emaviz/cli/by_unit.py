@@ -14,9 +14,9 @@ from ema_model.actuator import Actuator
 from ema_model.comparison.result import plain
 from ema_model.errors import InputError, did_you_mean, quoted
 from ema_model.files.opened import FILE_BYTES, listed
+from ema_model.fleet.folders import check_same_type
 from ema_model.recordings import Measurement, read_header
 from ema_model.recordings.recording_set import RUN, held_out, is_pattern
-from ema_model.units.folders import check_same_type
 from emaviz.cli import flow, given, output
 
 _BY_FOLDER = ("unit", "folder")
@@ -27,8 +27,8 @@ Units = dict[str, list[Measurement]]
 
 def run(arguments: argparse.Namespace, actuator: Actuator) -> int:
     """Compares the units."""
-    from ema_model.units.compare import compare_units
-    from ema_model.units.result import as_dict
+    from ema_model.fleet.compare import compare_units
+    from ema_model.fleet.result import as_dict
 
     _refuse(arguments, _NOT_OF_UNITS)
     actuator = replace(actuator, effects={**actuator.effects, **given.effects_of(arguments, actuator.axes)})
@@ -50,7 +50,7 @@ def run(arguments: argparse.Namespace, actuator: Actuator) -> int:
 
 def run_discovery(arguments: argparse.Namespace, actuator: Actuator, signals: tuple[str, ...] | None) -> int:
     """Looks for what the units lack."""
-    from ema_model.units.discovery import as_dict, discover_units
+    from ema_model.fleet.discovery import as_dict, discover_units
 
     _refuse(arguments, ["record"])
 

@@ -8,7 +8,7 @@ from typing import Any
 import plotly.graph_objects as go
 import viser
 
-from ema_model.units.result import UnitsCompared, document_of, lacking, notes, rests_on, sentences
+from ema_model.fleet.result import UnitsCompared, document_of, lacking, notes, rests_on, sentences
 from emaviz.figures import units
 from emaviz.page.docked import COLUMNS, NEXT_COLUMN, PLOTS_EARLY
 from emaviz.page.panel import REPORT, FolderChoice, JobLine, KeepButtons, Keeps, PracticeButtons, Seal

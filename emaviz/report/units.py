@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from ema_model.units.result import UnitsCompared, headline
+from ema_model.fleet.result import UnitsCompared, headline
 from emaviz.figures import units
 from emaviz.report.page import Figures, Section, WordsSection, page, write
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from ema_model.units.discovery import UnitsDiscovered, headline
+from ema_model.fleet.discovery import UnitsDiscovered, headline
 from emaviz.report.page import Figures, Section, WordsSection, page, write
 from emaviz.report.units import TransferMatrix, UnitParameters
 

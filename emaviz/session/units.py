@@ -15,11 +15,11 @@ from ema_model.actuator import Actuator, parse_actuator, save_actuator
 from ema_model.actuator.write import as_toml
 from ema_model.errors import InputError, quoted
 from ema_model.estimation.problem import SIGNALS
+from ema_model.fleet.folders import check_same_type, units_in
+from ema_model.fleet.result import Alone, Difference, Need, OfRecording, OfType, Transfer, UnitsCompared
 from ema_model.recordings import Measurement, read
 from ema_model.recordings.recording_set import long_enough
 from ema_model.recordings.side_file import SideFile
-from ema_model.units.folders import check_same_type, units_in
-from ema_model.units.result import Alone, Difference, Need, OfRecording, OfType, Transfer, UnitsCompared
 from emaviz.session import files as session_files
 from emaviz.session.data_folder import DataFolder
 from emaviz.session.files import Practice, side_file_of
@@ -258,7 +258,7 @@ class ComparingUnits:
 
         def work(run: Run) -> None:
             nonlocal found
-            from ema_model.units.compare import compare_units  # here, since it brings all of scipy's optimisers
+            from ema_model.fleet.compare import compare_units  # here, since it brings all of scipy's optimisers
 
             told: list[str] = []
             given, unseen = (self._read_all(part, actuator, run, told) for part in (fitted, held))

@@ -9,10 +9,10 @@ from typing import Literal
 
 from ema_model.comparison.result import Comparison
 from ema_model.discovery.result import Discovery
+from ema_model.fleet.result import UnitsCompared
 from ema_model.identification.run import Identification
 from ema_model.identification.words import remarks
 from ema_model.text import COLOURS, Block, Document, Table
-from ema_model.units.result import UnitsCompared
 from emaviz.text.html import Html, boxed, html, joined, unescaped
 
 # --- what a verdict means, which its colour says on the page as in a report -------------------------------------------

@@ -10,7 +10,7 @@ import pytest
 
 from ema_model.actuator import load_actuator
 from ema_model.errors import InputError
-from ema_model.units.result import Alone, Difference, Need, OfRecording, OfType, Transfer, UnitsCompared, as_dict
+from ema_model.fleet.result import Alone, Difference, Need, OfRecording, OfType, Transfer, UnitsCompared, as_dict
 from emaviz.session.units import read_saved, saved
 
 ACTUATOR = load_actuator()

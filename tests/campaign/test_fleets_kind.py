@@ -10,9 +10,9 @@ import pytest
 from ema_model.actuator import load_actuator
 from ema_model.campaign.kinds.fleets import KIND, Settings, scored
 from ema_model.errors import InputError
+from ema_model.fleet.result import Difference, OfType, Transfer, UnitsCompared
 from ema_model.simulated_fleets import Difference as True_
 from ema_model.simulated_fleets import draw
-from ema_model.units.result import Difference, OfType, Transfer, UnitsCompared
 
 ACTUATOR = load_actuator()
 GAIN, CONSTANT, PLAY = "controller.speed_gain_Nms_rad", "motor.torque_constant_Nm_A", "transmission.backlash_rad"

@@ -19,10 +19,10 @@ from support.flights import flights
 import ema_model as em
 import emaviz
 from ema_model import comparison, discovery
+from ema_model.fleet.compare import compare_units
 from ema_model.identification import run
 from ema_model.recordings import Measurement
 from ema_model.tracking.track import track
-from ema_model.units.compare import compare_units
 
 FUNCTIONS = [name for name in em.__all__ if inspect.isfunction(getattr(em, name))]
 # Each with the functions that it hands its options to; what those take beside are recordings, or made of them.

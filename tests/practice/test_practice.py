@@ -13,14 +13,14 @@ from ema_model.actuator import load_actuator
 from ema_model.challenges import challenges, folder
 from ema_model.challenges.truth import read_toml
 from ema_model.errors import InputError
+from ema_model.fleet.compare import compare_units
+from ema_model.fleet.folders import units_in
 from ema_model.practice import made
 from ema_model.practice.kinds import KINDS
 from ema_model.recordings import read
 from ema_model.simulated_lives import drawn, worn_life
 from ema_model.tracking.flights import flights_in
 from ema_model.tracking.track import track
-from ema_model.units.compare import compare_units
-from ema_model.units.folders import units_in
 from emaviz.cli import main
 
 SHIPPED = {one.name: one for one in practice.shipped()}

@@ -18,10 +18,10 @@ from ema_model.actuator import Actuator
 from ema_model.campaign.kinds.kind import FLAG, NUMBER, TEXTS, Kind
 from ema_model.campaign.plan_axes import TaskInputs
 from ema_model.errors import InputError
+from ema_model.fleet.compare import compare_units
+from ema_model.fleet.result import Difference, UnitsCompared
 from ema_model.recordings import Measurement
 from ema_model.simulated_fleets import RUNS, UNSEEN, Fleet, draw, recorded
-from ema_model.units.compare import compare_units
-from ema_model.units.result import Difference, UnitsCompared
 
 
 @dataclass(frozen=True)

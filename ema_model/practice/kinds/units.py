@@ -8,12 +8,12 @@ from pathlib import Path
 
 from ema_model.actuator import Actuator
 from ema_model.actuator.parameters import on_axes
+from ema_model.fleet.result import UnitsCompared
 from ema_model.practice.kinds.kind import Kind, Progress, Revealed, Truth
 from ema_model.quantities.titles import in_sentence
 from ema_model.recordings import write_measurement
 from ema_model.simulated_fleets import RUNS, UNSEEN, Fleet, draw, recorded
 from ema_model.text import InWords
-from ema_model.units.result import UnitsCompared
 
 
 class Units(Kind):

@@ -45,7 +45,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def documents() -> tuple[type, ...]:
     """What --json holds: of recordings, and of units beside each other."""
     from ema_model.comparison.result import ComparisonJson
-    from ema_model.units.result import UnitsComparedJson
+    from ema_model.fleet.result import UnitsComparedJson
 
     return (ComparisonJson, UnitsComparedJson)
 

@@ -33,7 +33,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def documents() -> tuple[type, ...]:
     """What --json holds: of recordings, and of units beside each other."""
     from ema_model.discovery.words import DiscoveryJson
-    from ema_model.units.discovery import UnitsDiscoveredJson
+    from ema_model.fleet.discovery import UnitsDiscoveredJson
 
     return (DiscoveryJson, UnitsDiscoveredJson)
 

@@ -7,8 +7,8 @@ from dataclasses import replace
 import pytest
 
 from ema_model.actuator import load_actuator
+from ema_model.fleet.discovery import discover_units, sentences
 from ema_model.simulated_fleets import draw, recorded
-from ema_model.units.discovery import discover_units, sentences
 
 ACTUATOR = load_actuator()
 BACKLASH = "transmission.backlash_rad"

@@ -13,7 +13,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from ema_model.units.block import Block
+from ema_model.fleet.block import Block
 
 Array = NDArray[np.float64]
 Pair = tuple[int, int]  # a unit and a parameter, by their places

@@ -14,16 +14,16 @@ from ema_model.comparison.result import ParameterJson, parameter_dict
 from ema_model.discovery import Added, Discovery, discover
 from ema_model.discovery import as_dict as of_discovery
 from ema_model.discovery.words import DiscoveryJson, effect_title
+from ema_model.fleet.compare import check_units, compare_units
+from ema_model.fleet.result import UnitsCompared, UnitsComparedJson, and_so_on, notes, rests_on
+from ema_model.fleet.result import as_dict as of_compared
+from ema_model.fleet.result import document_of as document_of_compared
+from ema_model.fleet.result import sentences as of_differences
 from ema_model.quantities.axes import Axes
 from ema_model.quantities.numbers import number
 from ema_model.quantities.titles import in_sentence
 from ema_model.recordings import Measurement
 from ema_model.text import Block, Document, InWords, Lines, Note, Table
-from ema_model.units.compare import check_units, compare_units
-from ema_model.units.result import UnitsCompared, UnitsComparedJson, and_so_on, notes, rests_on
-from ema_model.units.result import as_dict as of_compared
-from ema_model.units.result import document_of as document_of_compared
-from ema_model.units.result import sentences as of_differences
 
 # --- looks for the physics that units lack: unit by unit, and in each again for what others lack ----------------------
 # Each unit's parameters are its own in this, so that what units differ in is no effect that they lack.  An effect that

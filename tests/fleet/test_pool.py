@@ -7,9 +7,9 @@ from itertools import combinations, product
 import numpy as np
 import pytest
 
-from ema_model.units.block import Block
-from ema_model.units.pool import DIFFERENCE, Pool, scatter
-from ema_model.units.select import alike, price_of, select, total
+from ema_model.fleet.block import Block
+from ema_model.fleet.pool import DIFFERENCE, Pool, scatter
+from ema_model.fleet.select import alike, price_of, select, total
 
 PARAMETERS = 6
 NONE = np.zeros(PARAMETERS)

@@ -13,17 +13,17 @@ from ema_model.actuator.parameters import low_limit, on_axes, path_inside
 from ema_model.errors import InputError, quoted
 from ema_model.estimation import default_free
 from ema_model.estimation.problem import SIGNALS
+from ema_model.fleet.block import Block, pooled, starts_at, unit_of
+from ema_model.fleet.block import linearised as linearised_at
+from ema_model.fleet.criteria import MISFIT, REFUSED, REFUSED_SHARE, SLOPE, TOLD, UNTOLD
+from ema_model.fleet.fit import Fitted, Together, fit, together
+from ema_model.fleet.pool import Pair, Pool
+from ema_model.fleet.result import Alone, Difference, Need, OfRecording, OfType, Transfer, UnitsCompared
+from ema_model.fleet.select import alike
 from ema_model.quantities.numbers import HALF_90
 from ema_model.recordings import Measurement
 from ema_model.recordings.read import check_same_actuator, prepared
 from ema_model.recordings.recording_set import check_held_out
-from ema_model.units.block import Block, pooled, starts_at, unit_of
-from ema_model.units.block import linearised as linearised_at
-from ema_model.units.criteria import MISFIT, REFUSED, REFUSED_SHARE, SLOPE, TOLD, UNTOLD
-from ema_model.units.fit import Fitted, Together, fit, together
-from ema_model.units.pool import Pair, Pool
-from ema_model.units.result import Alone, Difference, Need, OfRecording, OfType, Transfer, UnitsCompared
-from ema_model.units.select import alike
 
 # --- the model of each unit on the recordings of each other one -------------------------------------------------------
 

@@ -10,13 +10,13 @@ import pytest
 
 from ema_model.actuator import load_actuator, save_actuator
 from ema_model.estimation import calibrate
+from ema_model.fleet import fit as fitting
+from ema_model.fleet.block import linearised, unit_of, wider
+from ema_model.fleet.compare import compare_units
+from ema_model.fleet.fit import At, fit, simpler
+from ema_model.fleet.result import as_dict, notes, sentences
 from ema_model.recordings import Measurement
 from ema_model.simulated_fleets import draw, recorded
-from ema_model.units import fit as fitting
-from ema_model.units.block import linearised, unit_of, wider
-from ema_model.units.compare import compare_units
-from ema_model.units.fit import At, fit, simpler
-from ema_model.units.result import as_dict, notes, sentences
 
 ACTUATOR = load_actuator()
 BACKLASH = "transmission.backlash_rad"
@@ -229,7 +229,7 @@ def test_the_work_grows_with_the_units_and_no_faster(monkeypatch):
             calls["linearised"] += 1
             return real_line(unit, x, seed, 1, *rest)
 
-        monkeypatch.setattr("ema_model.units.compare.fit", fitted_)
+        monkeypatch.setattr("ema_model.fleet.compare.fit", fitted_)
         monkeypatch.setattr(fitting, "linearised", line)
         recordings, _ = units_of(count, {}, seed=5)
         compare_units({name: given[:1] for name, given in recordings.items()}, ACTUATOR)

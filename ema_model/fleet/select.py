@@ -14,9 +14,9 @@ from itertools import combinations
 import numpy as np
 from scipy.special import chdtri, stdtrit
 
-from ema_model.units.block import Block
-from ema_model.units.criteria import ALIKE, FALSE, FURTHER, MINORITY, SCATTER_UNITS
-from ema_model.units.pool import Pair, Pool, scatter
+from ema_model.fleet.block import Block
+from ema_model.fleet.criteria import ALIKE, FALSE, FURTHER, MINORITY, SCATTER_UNITS
+from ema_model.fleet.pool import Pair, Pool, scatter
 
 _LARGEST_SET = 4  # parameters of a unit, that are chosen together
 _MOST_EXCHANGES = 20

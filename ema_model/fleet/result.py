@@ -12,11 +12,11 @@ from numpy.typing import NDArray
 
 from ema_model.actuator import Actuator
 from ema_model.actuator.parameters import on_axes
+from ema_model.fleet.criteria import MISFIT
 from ema_model.quantities.axes import of_signal
 from ema_model.quantities.numbers import HALF_90, IntervalJson, amount, number, with_uncertainty
 from ema_model.quantities.titles import in_sentence
 from ema_model.text import Block, Document, InWords, Lines, Note, Table
-from ema_model.units.criteria import MISFIT
 
 # --- what was found in comparing units --------------------------------------------------------------------------------
 # What was found in comparing units: in what which of them differ, how they are of a type, which model suits which.

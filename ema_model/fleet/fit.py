@@ -12,11 +12,11 @@ from scipy.special import stdtrit
 
 from ema_model.estimation import Calibration, Floor, after_fit, calibrate
 from ema_model.estimation.floor import twin_error
+from ema_model.fleet.block import WIDER, Candidate, Linearised, Unit, colour_of, linearised, pooled
+from ema_model.fleet.criteria import FALSE
+from ema_model.fleet.pool import Pool
+from ema_model.fleet.select import price_of, select
 from ema_model.identification.fit import TWINS
-from ema_model.units.block import WIDER, Candidate, Linearised, Unit, colour_of, linearised, pooled
-from ema_model.units.criteria import FALSE
-from ema_model.units.pool import Pool
-from ema_model.units.select import price_of, select
 
 # --- in what the recordings of one unit disagree ----------------------------------------------------------------------
 # The zero of the current's sensor, by how long the current is late, and how warm the winding was.

@@ -2,10 +2,10 @@
 
 from emaviz.report.comparison import write_report
 from emaviz.report.discovery import write_discovery_report
+from emaviz.report.fleet import write_units_report
+from emaviz.report.fleet_discovery import write_units_discovery_report
 from emaviz.report.identification import write_identification_report
 from emaviz.report.tracking import write_tracking_report
-from emaviz.report.units import write_units_report
-from emaviz.report.units_discovery import write_units_discovery_report
 
 __all__ = [
     "write_discovery_report",

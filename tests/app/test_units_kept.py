@@ -11,7 +11,7 @@ import pytest
 from ema_model.actuator import load_actuator
 from ema_model.errors import InputError
 from ema_model.fleet.result import Alone, Difference, Need, OfRecording, OfType, Transfer, UnitsCompared, as_dict
-from emaviz.session.units import read_saved, saved
+from emaviz.session.fleet import read_saved, saved
 
 ACTUATOR = load_actuator()
 PLAY, GAIN = "transmission.backlash_rad", "controller.speed_gain_Nms_rad"

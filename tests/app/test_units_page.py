@@ -9,8 +9,8 @@ from support.on_page import choose, fill, wait_until
 from ema_model.actuator import load_actuator
 from emaviz.cli import main
 from emaviz.colours import LIMIT
+from emaviz.page.fleet import UnitsTab
 from emaviz.page.style import STRIP_HEIGHT_PX
-from emaviz.page.units import UnitsTab
 
 pytestmark = pytest.mark.browser
 

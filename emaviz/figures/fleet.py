@@ -1,4 +1,4 @@
-"""Figures of several units: their parameters, and models on each other's recordings."""
+"""Figures of a fleet: the parameters of its units, and models on each other's recordings."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Comparing units without a screen, and what is saved of it."""
+"""Comparing the units of a fleet without a screen, and what is saved of it."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The Units tab."""
+"""The Units tab: the units of one type, in what they differ, and models on each other's recordings."""
 
 from __future__ import annotations
 
@@ -9,13 +9,13 @@ import plotly.graph_objects as go
 import viser
 
 from ema_model.fleet.result import UnitsCompared, document_of, lacking, notes, rests_on, sentences
-from emaviz.figures import units
+from emaviz.figures import fleet
 from emaviz.page.docked import COLUMNS, NEXT_COLUMN, PLOTS_EARLY
 from emaviz.page.panel import REPORT, FolderChoice, JobLine, KeepButtons, Keeps, PracticeButtons, Seal
 from emaviz.page.tab import Shared, Standing, Tab
 from emaviz.page.workspaces import Page, Workspace
+from emaviz.session.fleet import TYPE, ComparingUnits
 from emaviz.session.saved import Part
-from emaviz.session.units import TYPE, ComparingUnits
 from emaviz.text.html import BOX, DIM, Html, add_html, begin, html, joined, note
 from emaviz.text.results import MEANINGS, begun, of_units, warned, whole
 
@@ -92,10 +92,10 @@ class UnitsResult:
                 self._told.content = begin("No units are compared yet", _STEPS)
                 return
             self._told.content = said(found)
-            self._parameters.figure = units.unit_parameters(found)
-            least, usual, most = (one(found) for one in units.HEIGHTS_PX)
+            self._parameters.figure = fleet.unit_parameters(found)
+            least, usual, most = (one(found) for one in fleet.HEIGHTS_PX)
             self._page.workspaces.heights.set_figure(self._parameters, least, usual, most, _BESIDE_PX)
-            self._transfer.figure = units.transfer_matrix(found)
+            self._transfer.figure = fleet.transfer_matrix(found)
             rows = max(len(found.units), _FEWEST_ROWS)
             self._transfer.aspect = (_HEAD_PX + _ROW_PX * rows) / _WIDTH_PX
             self._document.content = whole(document_of(found))

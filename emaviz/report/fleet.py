@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from ema_model.fleet.result import UnitsCompared, headline
-from emaviz.figures import units
+from emaviz.figures import fleet
 from emaviz.report.page import Figures, Section, WordsSection, page, write
 
 
@@ -24,9 +24,9 @@ class UnitParameters(Section[UnitsCompared]):
 
     def body(self, subject: UnitsCompared, figures: Figures) -> str:
         """Left out where nothing is told."""
-        if not units.shown(subject):
+        if not fleet.shown(subject):
             return ""
-        return figures.place(units.unit_parameters(subject), units.height_px(subject))
+        return figures.place(fleet.unit_parameters(subject), fleet.height_px(subject))
 
 
 # --- which unit's model suits which unit ------------------------------------------------------------------------------
@@ -40,7 +40,7 @@ class TransferMatrix(Section[UnitsCompared]):
 
     def body(self, subject: UnitsCompared, figures: Figures) -> str:
         """Always there."""
-        return figures.place(units.transfer_matrix(subject), 160 + 28 * len(subject.units))
+        return figures.place(fleet.transfer_matrix(subject), 160 + 28 * len(subject.units))
 
 
 # --- the report of several units of one type --------------------------------------------------------------------------

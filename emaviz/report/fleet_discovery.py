@@ -5,8 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 
 from ema_model.fleet.discovery import UnitsDiscovered, headline
+from emaviz.report.fleet import TransferMatrix, UnitParameters
 from emaviz.report.page import Figures, Section, WordsSection, page, write
-from emaviz.report.units import TransferMatrix, UnitParameters
 
 
 class Answer(WordsSection[UnitsDiscovered]):

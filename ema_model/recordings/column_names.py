@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 from ema_model.files.opened import shown
 from ema_model.quantities.axes import SIGNALS
 from ema_model.quantities.titles import in_sentence
-from ema_model.quantities.units import UNITS, find_unit
+from ema_model.quantities.unit_conversion import UNITS, find_unit
 
 # What is measured.
 QUANTITIES: dict[str, frozenset[str]] = {

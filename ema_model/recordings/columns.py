@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from ema_model.errors import InputError, did_you_mean
 from ema_model.files.opened import listed, shown
 from ema_model.quantities.axes import SIGNALS
-from ema_model.quantities.units import Unit, dimensions_of, find_unit, known_units
+from ema_model.quantities.unit_conversion import UnitOfMeasure, dimensions_of, find_unit, known_units
 from ema_model.recordings.column_names import Context, Guess, guesses, readings
 from ema_model.recordings.exports import known_export
 from ema_model.recordings.formats.clocks import Clocks
@@ -66,7 +66,7 @@ class MappedColumn:
         _unit(self.signal, self.unit)
 
     @property
-    def converter(self) -> Unit:
+    def converter(self) -> UnitOfMeasure:
         """The unit, with its factor to SI."""
         return _unit(self.signal, self.unit)
 
@@ -235,10 +235,10 @@ def _number(text: str, name: str, value: str) -> float:
         raise InputError(f"mapping {shown(text)!r}: {name} must be a number, not {shown(value)!r}") from None
 
 
-def _unit(signal: str, text: str) -> Unit:
+def _unit(signal: str, text: str) -> UnitOfMeasure:
     dimension = SIGNALS[signal].unit
     if not text:
-        return Unit(dimension, dimension)
+        return UnitOfMeasure(dimension, dimension)
     unit = find_unit(text, dimension)
     if unit is None:
         other = dimensions_of(text)

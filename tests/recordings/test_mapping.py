@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from ema_model.errors import InputError
-from ema_model.quantities.units import UNITS, find_unit
+from ema_model.quantities.unit_conversion import UNITS, find_unit
 from ema_model.recordings import (
     SIGNALS,
     ColumnMapping,

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from ema_model.errors import InputError
 from ema_model.files.opened import COLUMNS, listed, refusal, shown
-from ema_model.quantities.units import Unit, dimensions_of, find_unit
+from ema_model.quantities.unit_conversion import UnitOfMeasure, dimensions_of, find_unit
 from ema_model.recordings.column_names import QUANTITIES, is_time, readings
 from ema_model.recordings.formats.clocks import Clocks, between, covered, is_state, main_clock, rule, usable
 from ema_model.recordings.formats.format import check_size
@@ -259,7 +259,7 @@ def is_clock(channel: Channel) -> bool:
     return bool(np.isfinite(values).all() and np.count_nonzero(usable(values)) > _RISING * values.size)
 
 
-def _unit(channel: Channel) -> Unit | None:
+def _unit(channel: Channel) -> UnitOfMeasure | None:
     return find_unit(readings(with_unit(channel.path[-1], channel.unit))[0].unit, "s")
 
 
@@ -267,7 +267,7 @@ def _has_unit(channel: Channel) -> bool:
     return bool(readings(with_unit(channel.path[-1], channel.unit))[0].unit)
 
 
-def _seconds(channel: Channel, unit: Unit | None) -> Array:
+def _seconds(channel: Channel, unit: UnitOfMeasure | None) -> Array:
     values = np.asarray(channel.values()).reshape(-1).astype(np.float64)
     return values if unit is None else unit.to_si(values)
 

@@ -19,7 +19,7 @@ import pyarrow.csv as pc
 from ema_model.errors import InputError, quoted
 from ema_model.files.opened import LINE_BYTES, listed, megabytes, refusal, shown
 from ema_model.quantities.axes import SIGNALS
-from ema_model.quantities.units import find_unit
+from ema_model.quantities.unit_conversion import find_unit
 from ema_model.recordings.column_names import is_time, readings
 from ema_model.recordings.formats.channels import beside_time, tokens, with_unit
 from ema_model.recordings.formats.clocks import Clocks, between, covered, is_state, main_clock, rule

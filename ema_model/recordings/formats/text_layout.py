@@ -14,7 +14,7 @@ from dataclasses import dataclass
 from functools import lru_cache
 
 from ema_model.files.opened import refusal, shown
-from ema_model.quantities.units import dimensions_of
+from ema_model.quantities.unit_conversion import dimensions_of
 from ema_model.recordings.formats.stamps import is_stamp
 
 HEAD_BYTES = 65_536

@@ -9,7 +9,7 @@ from typing import Any
 import viser
 
 from ema_model.errors import InputError, quoted
-from ema_model.quantities.units import known_units
+from ema_model.quantities.unit_conversion import known_units
 from ema_model.recordings import SIGNALS, ColumnMapping, MappedColumn
 from ema_model.recordings.columns import WITHOUT_DELAY
 from ema_model.recordings.formats.text_layout import ENCODINGS, Hints

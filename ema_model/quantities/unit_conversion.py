@@ -1,4 +1,4 @@
-"""Units and how they convert."""
+"""Units that recordings come in, and how each converts to SI."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ _INCH = 0.0254  # m
 
 
 @dataclass(frozen=True)
-class Unit:
+class UnitOfMeasure:
     """SI = (value + offset)·numerator/denominator; `dimension` is the SI unit, as in `Signal.unit`.
 
     Two numbers, since dividing by 1000 rounds once and multiplying by 0.001 twice.
@@ -141,20 +141,20 @@ def plain(text: str) -> str:
     return re.sub(r"[\s·⋅*_]+|\.(?![0-9])|(?<![0-9])\.|(?<=[a-z])-(?=[a-z])", "", text)
 
 
-def _tabled() -> dict[str, dict[str, Unit]]:
-    units: dict[str, dict[str, Unit]] = {}
+def _tabled() -> dict[str, dict[str, UnitOfMeasure]]:
+    units: dict[str, dict[str, UnitOfMeasure]] = {}
     for dimension, rows in _TABLE.items():
         units[dimension] = {}
         for spellings, numerator, denominator, offset in rows:
-            unit = Unit(spellings.split()[0], dimension, float(numerator), float(denominator), float(offset))
+            unit = UnitOfMeasure(spellings.split()[0], dimension, float(numerator), float(denominator), float(offset))
             units[dimension] |= {plain(spelling): unit for spelling in spellings.split()}
     return units
 
 
-UNITS: dict[str, dict[str, Unit]] = _tabled()
+UNITS: dict[str, dict[str, UnitOfMeasure]] = _tabled()
 
 
-def find_unit(text: str, dimension: str) -> Unit | None:
+def find_unit(text: str, dimension: str) -> UnitOfMeasure | None:
     """The unit of this dimension that the text names, or None.
 
     `counts/4096` is an encoder's counts of 4096 per turn, `counts/4096/s` its rate; without the number the
@@ -169,18 +169,18 @@ def dimensions_of(text: str) -> list[str]:
     return [dimension for dimension in UNITS if _spelt(spelling, dimension)]
 
 
-def _spelt(spelling: str, dimension: str) -> Unit | None:
+def _spelt(spelling: str, dimension: str) -> UnitOfMeasure | None:
     if spelling in UNITS.get(dimension, {}):
         return UNITS[dimension][spelling]
     if not dimension and (share := _SHARE.fullmatch(spelling)):
-        return Unit(f"/{share[1]}", dimension, 1.0, float(share[1]))
+        return UnitOfMeasure(f"/{share[1]}", dimension, 1.0, float(share[1]))
     counts = _COUNTS.fullmatch(spelling)
     if counts and dimension == ("rad/s" if counts[2] or counts[4] else "rad"):
         per_turn = float(counts[3] or 0)
         rate = "/s" if dimension == "rad/s" else ""
         if not per_turn:
-            return Unit(f"counts{rate}", dimension, float("nan"))
-        return Unit(f"counts/{per_turn:.12g}{rate}", dimension, 2.0 * pi, per_turn)
+            return UnitOfMeasure(f"counts{rate}", dimension, float("nan"))
+        return UnitOfMeasure(f"counts/{per_turn:.12g}{rate}", dimension, 2.0 * pi, per_turn)
     return None
 
 

@@ -15,7 +15,7 @@ from emaviz.page.panel import REPORT, FolderChoice, JobLine, KeepButtons, Keeps,
 from emaviz.page.tab import Shared, Standing, Tab
 from emaviz.page.workspaces import Page, Workspace
 from emaviz.session.fleet import TYPE, ComparingUnits
-from emaviz.session.saved import Part
+from emaviz.session.session_file import Part
 from emaviz.text.html import BOX, DIM, Html, add_html, begin, html, joined, note
 from emaviz.text.results import MEANINGS, begun, of_units, warned, whole
 

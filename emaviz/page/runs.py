@@ -26,12 +26,13 @@ from emaviz.recording.entry import Entry, error_said, setting
 from emaviz.recording.read import Recording
 from emaviz.recording.viewer import ViewerHost
 from emaviz.scene.playback import motion
-from emaviz.session import saved as session_file
+from emaviz.session import session_file
 from emaviz.session.compare import Comparing
 from emaviz.session.data_folder import SESSION_SUFFIX
 from emaviz.session.files import UPLOADED
 from emaviz.session.jobs import Worker
-from emaviz.session.saved import Part, Recorded
+from emaviz.session.recorded_runs import RecordedRuns
+from emaviz.session.session_file import Part
 from emaviz.text.html import Html, add_html, begin, boxed, html, joined, said
 
 # --- everything on the page as one file: saved to the data folder and to the browser, loaded from either --------------
@@ -247,7 +248,7 @@ class RunsPanel:
     """The tab's controls.  `result` is the panel on the right; files are read on the worker `files`."""
 
     def __init__(
-        self, page: Page, viewer: ViewerHost | None, recorded: Recorded, files: Worker, result: RunsResult
+        self, page: Page, viewer: ViewerHost | None, recorded: RecordedRuns, files: Worker, result: RunsResult
     ) -> None:
         self._page, self._viewer, self._recorded = page, viewer, recorded
         self._files, self._result = files, result
@@ -494,7 +495,7 @@ class RunsTab(Tab):
     def build(self) -> None:
         """The recordings, sessions and campaigns."""
         shared, page = self.shared, self.page
-        recorded = Recorded(shared.comparing.folder.recordings)
+        recorded = RecordedRuns(shared.comparing.folder.recordings)
         self.panel = RunsPanel(page, shared.viewer, recorded, shared.files, self.result)
         self.sessions = SessionControls(page, shared.comparing, shared.files, shared.kept, shared.standings.lines)
         CampaignControls(

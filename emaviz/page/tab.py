@@ -22,7 +22,7 @@ from emaviz.session.compare import Comparing
 from emaviz.session.discover.discovering import Discovering
 from emaviz.session.inputs import Provenance, results_part
 from emaviz.session.jobs import Worker
-from emaviz.session.saved import Part
+from emaviz.session.session_file import Part
 from emaviz.text.html import Html, HtmlPiece, add_html, html
 
 # --- above a result: whether it still is of what is chosen, what a session lacks, and a press of the tab's Start ------

@@ -41,7 +41,7 @@ from emaviz.recording.viewer import ViewerHost
 from emaviz.server.viser_private import Inside, id_of
 from emaviz.session.compare import Comparing
 from emaviz.session.jobs import Worker
-from emaviz.session.saved import Part
+from emaviz.session.session_file import Part
 from emaviz.session.track import Following
 from emaviz.text.html import BOX, DIM, Html, add_html, begin, boxed, html, joined, note
 from emaviz.text.results import warned, whole

@@ -11,7 +11,7 @@ import msgspec
 
 from ema_model.recordings import side_path
 from emaviz.session.jobs import Job
-from emaviz.session.saved import Part
+from emaviz.session.session_file import Part
 from emaviz.session.settings import taken
 
 _MOST_NAMES = 3

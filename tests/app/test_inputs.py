@@ -17,7 +17,7 @@ from ema_model.commands import command
 from ema_model.faults import HEALTHY
 from ema_model.recordings import write_measurement
 from ema_model.simulation.run import Run, simulate_reference
-from emaviz.session import saved as session_file
+from emaviz.session import session_file
 from emaviz.session.campaigns import Campaigns
 from emaviz.session.compare import Comparing
 from emaviz.session.data_folder import DataFolder
@@ -27,8 +27,8 @@ from emaviz.session.fleet import ComparingUnits
 from emaviz.session.inputs import Inputs, Provenance, results_part
 from emaviz.session.jobs import Job, Worker
 from emaviz.session.jobs import Run as JobRun
-from emaviz.session.saved import Part
 from emaviz.session.session import Session
+from emaviz.session.session_file import Part
 from emaviz.session.track import Following
 
 FILES = {"bench": ("chirp.csv", "step.csv"), "fleet/a": ("sine.csv",), "fleet/b": ("sine.csv",)}

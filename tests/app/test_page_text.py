@@ -18,7 +18,7 @@ from emaviz.page.app import App
 from emaviz.page.discover.tab import DiscoverTab
 from emaviz.page.explore.tab import ExploreTab
 from emaviz.page.runs import _card
-from emaviz.session.saved import Recorded, recovered
+from emaviz.session.recorded_runs import RecordedRuns, recovered
 from emaviz.text.html import Html, html, html_escape, joined, said
 
 RAW = ("<iframe srcdoc", "<img", "<script", 'href="javascript')
@@ -137,7 +137,7 @@ def test_the_story_of_a_challenge(app):
 
 def test_recordings_and_what_they_say_of_themselves(app):
     check(app, *(f"{name}.rrd" for name in hostile.NAMES), f"whole {hostile.FRAME}.rrd")
-    recorded = Recorded(app.comparing.folder.recordings)
+    recorded = RecordedRuns(app.comparing.folder.recordings)
     first, second = (recorded.entry(f"{name}.rrd") for name in hostile.NAMES[:2])
     assert first.settings[hostile.FRAME] == hostile.FRAME and first.best == hostile.FRAME
     for text in (runs.two_recordings_table(first, second), _card(first), _card(second)):

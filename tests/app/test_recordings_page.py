@@ -18,7 +18,7 @@ from emaviz.figures import runs
 from emaviz.recording import RecordingWriter, read
 from emaviz.recording.entry import setting
 from emaviz.recording.viewer import ViewerHost
-from emaviz.session.saved import Recorded
+from emaviz.session.recorded_runs import RecordedRuns
 from emaviz.session.session import Session
 
 
@@ -74,7 +74,7 @@ def test_settings_are_told_in_words_and_units(name, value, told):
 def recorded(races, tmp_path):
     for race in races:
         os.link(race.path, tmp_path / race.path.name)
-    return Recorded(tmp_path)
+    return RecordedRuns(tmp_path)
 
 
 # --- without a browser ------------------------------------------------------------------------------------------------

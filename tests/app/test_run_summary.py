@@ -11,7 +11,7 @@ from support.on_page import wait_until
 
 from ema_model.quantities.numbers import with_uncertainty
 from emaviz.page.discover.tab import step
-from emaviz.session.saved import Recorded, summary
+from emaviz.session.recorded_runs import RecordedRuns, summary
 
 
 @pytest.mark.parametrize(
@@ -45,7 +45,7 @@ def test_a_run_is_named_by_what_it_is(said, told):
 
 def test_a_damaged_run_is_listed_as_one(tmp_path):
     (tmp_path / "bad.rrd").write_bytes(b"nothing")
-    entry = Recorded(tmp_path).entry("bad.rrd")
+    entry = RecordedRuns(tmp_path).entry("bad.rrd")
     assert (entry.kind, entry.says, entry.found) == ("run", "", {})
 
 

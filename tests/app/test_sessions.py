@@ -20,10 +20,10 @@ from emaviz.figures.identification import Row
 from emaviz.page.compare.tab import Asked
 from emaviz.page.playback import Looks
 from emaviz.page.runs import RunsTab
-from emaviz.session import saved as session_file
+from emaviz.session import session_file
 from emaviz.session.data_folder import DataFolder
 from emaviz.session.discover.source import SavedStory
-from emaviz.session.saved import Part
+from emaviz.session.session_file import Part
 from emaviz.session.settings import Settings, taken
 
 

@@ -20,9 +20,9 @@ from ema_model.recordings import ColumnMapping, MappedColumn
 from ema_model.recordings.columns import parse_mapping
 from ema_model.recordings.read import read_measurement
 from emaviz.cli import main
-from emaviz.session import saved as session_file
+from emaviz.session import session_file
 from emaviz.session.data_folder import DataFolder
-from emaviz.session.saved import Recorded
+from emaviz.session.recorded_runs import RecordedRuns
 from emaviz.session.settings import Settings
 
 LONG = "A" * 50_000
@@ -163,7 +163,7 @@ def test_what_a_browser_and_a_session_send(tmp_path, text):
         lambda: settings.restore({"command_settings": {"chirp": {text: 1}}}),
         lambda: folder.measurement(text),
         lambda: folder.place(f"{text}.exe"),
-        lambda: Recorded(tmp_path).entry(f"{text}.rrd"),
+        lambda: RecordedRuns(tmp_path).entry(f"{text}.rrd"),
     ):
         with pytest.raises(InputError) as told:
             change()

@@ -20,7 +20,7 @@ from ema_model.recordings import Measurement, write_measurement
 from ema_model.recordings.read import read_measurement
 from emaviz.cli.output import write_json
 from emaviz.recording import RecordingWriter, read
-from emaviz.session import saved as session_file
+from emaviz.session import session_file
 from emaviz.session.data_folder import DataFolder
 
 SIZE = 20_000

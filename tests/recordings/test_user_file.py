@@ -17,7 +17,7 @@ from ema_model.recordings.read import read_measurement
 from emaviz.cli import main
 from emaviz.recording import RecordingError
 from emaviz.recording.read import check, recover, recover_part
-from emaviz.session import saved as session_file
+from emaviz.session import session_file
 from emaviz.session.data_folder import DataFolder
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="makes a pipe")

@@ -132,9 +132,9 @@ def _actuator(path: Path, _: int) -> None:
 
 
 def _session(path: Path, _: int) -> None:
-    from emaviz.session import saved as session_file
+    from emaviz.session import session_file
     from emaviz.session.data_folder import DataFolder
-    from emaviz.session.saved import Part
+    from emaviz.session.session_file import Part
     from emaviz.session.settings import Settings
 
     with tempfile.TemporaryDirectory() as folder:
@@ -228,7 +228,7 @@ if __name__ == "__main__":
     for module in (
         "ema_model.challenges.challenge",
         "ema_model.effects",
-        "emaviz.session.saved",
+        "emaviz.session.session_file",
         "emaviz.session.settings",
     ):
         importlib.import_module(module)  # the first file shall not pay for these

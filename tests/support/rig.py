@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from ema_model.actuator import load_actuator
-from emaviz.session import saved as session_file
+from emaviz.session import session_file
 from emaviz.session.compare import Comparing
 from emaviz.session.data_folder import DataFolder
 from emaviz.session.discover.discovering import Discovering
-from emaviz.session.saved import Part
 from emaviz.session.session import Session
+from emaviz.session.session_file import Part
 from support.on_page import wait_until
 
 

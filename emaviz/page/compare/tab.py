@@ -31,7 +31,7 @@ from emaviz.session.compare import COMPARABLE, LAY_OUT, MAP, OPEN, Comparing
 from emaviz.session.data_folder import ACTUATOR_SUFFIX
 from emaviz.session.discover.discovering import Discovering
 from emaviz.session.files import UPLOADED, Description, Opened, Question
-from emaviz.session.saved import Part
+from emaviz.session.session_file import Part
 from emaviz.session.settings import taken
 from emaviz.text.html import Html, HtmlPiece, add_html, html, joined
 

@@ -31,7 +31,7 @@ from emaviz.server.viser_private import id_of
 from emaviz.session.data_folder import CHALLENGE_SUFFIX
 from emaviz.session.discover.discovering import Discovering
 from emaviz.session.discover.source import COMPARED
-from emaviz.session.saved import Part
+from emaviz.session.session_file import Part
 from emaviz.text.html import DIM, Html, add_html, boxed, html, note, said
 
 # --- the recordings of a discovery ------------------------------------------------------------------------------------

@@ -27,7 +27,7 @@ from emaviz.recording.viewer import ViewerHost
 from emaviz.session.compare import Comparing
 from emaviz.session.discover.discovering import Discovering
 from emaviz.session.identify import Race
-from emaviz.session.saved import Part
+from emaviz.session.session_file import Part
 from emaviz.session.settings import SLIDERS, Settings, limits, taken
 from emaviz.text.html import Html, add_html, html, joined
 

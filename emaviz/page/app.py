@@ -35,8 +35,8 @@ from emaviz.session.campaigns import Campaigns
 from emaviz.session.compare import Comparing
 from emaviz.session.data_folder import DataFolder
 from emaviz.session.discover.discovering import Discovering
+from emaviz.session.explore import Session
 from emaviz.session.jobs import Worker, report
-from emaviz.session.session import Session
 
 # --- finds the tabs: every file here that states a `WORKSPACE` and defines its tab, or folder whose `tab.py` does -----
 

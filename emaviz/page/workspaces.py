@@ -18,8 +18,8 @@ from emaviz.page.docked import Docked
 from emaviz.page.style import unseen
 from emaviz.server.beside import say_beside
 from emaviz.server.viser_private import Inside, id_of
+from emaviz.session.explore import Session
 from emaviz.session.jobs import Signal, Worker
-from emaviz.session.session import Session
 from emaviz.text.html import add_html
 from emaviz.text.results import begun, within
 

@@ -19,7 +19,7 @@ from ema_model.quantities.sides import USER
 from ema_model.recordings import Measurement
 from emaviz.scene.actuator import ARM, ActuatorScene, Machine, said
 from emaviz.scene.labels import Callout, callouts
-from emaviz.session.session import Simulation
+from emaviz.session.explore import Simulation
 
 # --- a run as poses: what the signals say, enlarged where nobody could see it, and by how much ------------------------
 

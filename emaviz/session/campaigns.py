@@ -21,9 +21,9 @@ from ema_model.identification.run import Progress, identify
 from ema_model.identification.search import Objective
 from ema_model.recordings import Measurement
 from emaviz.session.data_folder import DataFolder
+from emaviz.session.explore import Session
 from emaviz.session.inputs import Inputs, digest, version_of
 from emaviz.session.jobs import Job, Signal, Tell
-from emaviz.session.session import Session
 
 _HEADER = "campaign.json"
 _DEPTHS = ("*", "*/*")  # below the data folder

@@ -19,10 +19,10 @@ from ema_model.recordings.formats.text_layout import Hints
 from ema_model.recordings.side_file import SideFile
 from emaviz.session import files
 from emaviz.session.data_folder import DataFolder
+from emaviz.session.explore import Session
 from emaviz.session.files import Opened, all_measured, guesses, measured, read_opened, side_file_of, side_with
 from emaviz.session.inputs import Inputs, Provenance, digest, listed, version_of, version_with_side
 from emaviz.session.jobs import Job, Signal, Tell, Worker, report
-from emaviz.session.session import Session
 from emaviz.session.settings import number
 
 # --- what the screen listens to of Compare ----------------------------------------------------------------------------

@@ -22,10 +22,10 @@ from ema_model.recordings.recording_set import long_enough
 from ema_model.recordings.side_file import SideFile
 from emaviz.session import files as session_files
 from emaviz.session.data_folder import DataFolder
+from emaviz.session.explore import Session
 from emaviz.session.files import Practice, side_file_of
 from emaviz.session.inputs import Inputs, Provenance, digest, version_with_side
 from emaviz.session.jobs import Job, Run, Signal, Worker
-from emaviz.session.session import Session
 from emaviz.session.settings import taken
 
 # --- what a session's file holds of Units -----------------------------------------------------------------------------

@@ -11,8 +11,8 @@ from ema_model.effects import CATALOGUE, find
 from ema_model.errors import InputError, quoted
 from ema_model.quantities.titles import in_sentence
 from ema_model.simulation.with_effect import RUNS, EffectRuns, WithEffect
+from emaviz.session.explore import Session
 from emaviz.session.jobs import Job, Signal, Tell
-from emaviz.session.session import Session
 from emaviz.text.time_left import going_on
 
 _USUAL_S, _TICK_S = 30.0, 1.0  # on two idle cores; between two lines

@@ -28,10 +28,10 @@ from ema_model.tracking.history import History
 from ema_model.tracking.result import Tracked
 from ema_model.tracking.track import check_thresholds
 from emaviz.session.data_folder import DataFolder
+from emaviz.session.explore import Session
 from emaviz.session.files import Practice, side_file_of
 from emaviz.session.inputs import Inputs, Provenance, version_with_side
 from emaviz.session.jobs import RESTED, Job, Run, Signal, Stopped, Worker
-from emaviz.session.session import Session
 from emaviz.session.settings import number, taken
 
 # --- what a session's file holds of Track -----------------------------------------------------------------------------

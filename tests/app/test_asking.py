@@ -13,7 +13,7 @@ from ema_model.recordings import write_measurement
 from ema_model.simulation.run import Run, simulate_reference
 from emaviz.session.compare import Comparing
 from emaviz.session.data_folder import DataFolder
-from emaviz.session.session import Session
+from emaviz.session.explore import Session
 
 
 @pytest.fixture(scope="module")

@@ -19,7 +19,7 @@ from emaviz.page.campaigns import label, tables
 from emaviz.recording import read
 from emaviz.session.campaigns import Campaigns
 from emaviz.session.data_folder import DataFolder
-from emaviz.session.session import Session
+from emaviz.session.explore import Session
 
 GROUPS = """
 [groups.worn]

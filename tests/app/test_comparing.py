@@ -21,8 +21,8 @@ from ema_model.simulation.run import Run, simulate_reference
 from emaviz.recording import read
 from emaviz.session.compare import Comparing
 from emaviz.session.data_folder import DataFolder
+from emaviz.session.explore import Session
 from emaviz.session.files import UPLOADED, shipped_actuators
-from emaviz.session.session import Session
 
 
 @pytest.fixture(scope="module")

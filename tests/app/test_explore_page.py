@@ -21,7 +21,7 @@ from emaviz.figures import runs as runs_figures
 from emaviz.figures.runs import _within, at, beneath, differences, metrics, rise_time_s, run_metrics_table
 from emaviz.page.explore.tab import CUSTOM, PRESETS, ExploreTab, name_of
 from emaviz.page.identify.tab import IdentifyTab
-from emaviz.session.session import Session
+from emaviz.session.explore import Session
 from emaviz.session.settings import Settings
 
 CHART = """(title) => {

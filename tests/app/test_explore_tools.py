@@ -14,7 +14,7 @@ from ema_model.faults import vector
 from ema_model.simulation.run import simulate_monitor
 from emaviz.page.charts import png
 from emaviz.page.explore.tab import ExploreTab
-from emaviz.session.session import SEVERITIES, fan_of
+from emaviz.session.explore import SEVERITIES, fan_of
 from emaviz.session.settings import Settings, Undo
 
 # --- without a browser ------------------------------------------------------------------------------------------------

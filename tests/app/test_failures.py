@@ -15,7 +15,7 @@ import pytest
 from ema_model.actuator import load_actuator
 from emaviz.page.app import App
 from emaviz.recording import RecordingError, entry, read
-from emaviz.session.session import Session
+from emaviz.session.explore import Session
 
 Usage = namedtuple("Usage", "total used free")
 LOST = "rerun was hidden by this test"

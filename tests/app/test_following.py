@@ -15,8 +15,8 @@ from ema_model.actuator import load_actuator
 from ema_model.errors import InputError
 from emaviz.recording import read
 from emaviz.session.data_folder import DataFolder
+from emaviz.session.explore import Session
 from emaviz.session.jobs import Worker
-from emaviz.session.session import Session
 from emaviz.session.track import Following
 
 COUNT = 20

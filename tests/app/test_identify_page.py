@@ -26,8 +26,8 @@ from emaviz.figures import identification
 from emaviz.figures.identification import Row, table
 from emaviz.page.identify.result import at_iteration, telling
 from emaviz.recording.read import read
+from emaviz.session.explore import Session
 from emaviz.session.identify import MOST_FRAMES, Track, ends
-from emaviz.session.session import Session
 from emaviz.session.settings import Settings
 
 CHART = """(title) => {

@@ -23,11 +23,11 @@ from emaviz.session.compare import Comparing
 from emaviz.session.data_folder import DataFolder
 from emaviz.session.discover.discovering import Discovering
 from emaviz.session.discover.stories import Entry
+from emaviz.session.explore import Session
 from emaviz.session.fleet import ComparingUnits
 from emaviz.session.inputs import Inputs, Provenance, results_part
 from emaviz.session.jobs import Job, Worker
 from emaviz.session.jobs import Run as JobRun
-from emaviz.session.session import Session
 from emaviz.session.session_file import Part
 from emaviz.session.track import Following
 

@@ -16,8 +16,8 @@ from ema_model.simulation.compiled import library_stack, own_stack, stack_at_han
 from ema_model.simulation.run import Run, simulate_monitor, simulate_reference
 from emaviz.page.app import App
 from emaviz.page.explore.tab import ExploreTab
+from emaviz.session.explore import Session
 from emaviz.session.files import shipped_actuators
-from emaviz.session.session import Session
 
 SERVO, DRIVE = "XL330 on a pendulum", "ODrive motor"
 

@@ -18,8 +18,8 @@ from emaviz.figures import runs
 from emaviz.recording import RecordingWriter, read
 from emaviz.recording.entry import setting
 from emaviz.recording.viewer import ViewerHost
+from emaviz.session.explore import Session
 from emaviz.session.recorded_runs import RecordedRuns
-from emaviz.session.session import Session
 
 
 def identify(session, seconds=60.0):

@@ -29,7 +29,7 @@ from emaviz.scene.labels import Label, lay_out
 from emaviz.scene.playback import Playback, enlargement, motion
 from emaviz.scene.solids import FAULT, RESIDUAL
 from emaviz.server.safe_server import open_server
-from emaviz.session.session import Simulation
+from emaviz.session.explore import Simulation
 
 SOLIDS = {
     "block": solids.block(1.0, 2.0, 3.0),

@@ -12,7 +12,7 @@ import pytest
 
 from ema_model.actuator import load_actuator
 from emaviz.recording import RecordingError, read
-from emaviz.session.session import Session
+from emaviz.session.explore import Session
 
 
 @pytest.fixture

@@ -9,7 +9,7 @@ from support.documents import result_of
 
 from ema_model.actuator import load_actuator, save_actuator
 from emaviz.cli import main
-from emaviz.session.session import Session
+from emaviz.session.explore import Session
 
 
 @pytest.fixture

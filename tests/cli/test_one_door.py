@@ -23,7 +23,7 @@ from emaviz.cli import main
 from emaviz.session.compare import Comparing
 from emaviz.session.data_folder import DataFolder
 from emaviz.session.discover.source import DiscoverySource
-from emaviz.session.session import Session
+from emaviz.session.explore import Session
 
 BALL_SCREW = """
 name = "Ball screw"

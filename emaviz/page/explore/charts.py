@@ -23,8 +23,8 @@ from emaviz.page.workspaces import Page
 from emaviz.scene.playback import FIRST
 from emaviz.server.safe_server import SCENES
 from emaviz.session.data_folder import DataFolder
+from emaviz.session.explore import Fan, Simulation
 from emaviz.session.jobs import Worker
-from emaviz.session.session import Fan, Simulation
 from emaviz.text.html import add_html, html, said
 
 # --- explore's tabs on the right: the signals, the phases, the run in numbers, and what can be taken away -------------

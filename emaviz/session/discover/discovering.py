@@ -29,9 +29,9 @@ from emaviz.session.compare import Comparing
 from emaviz.session.data_folder import DataFolder
 from emaviz.session.discover.source import NOTHING, DiscoverySource, Sealing
 from emaviz.session.discover.stories import Entries, Entry, SavedStories, Shown, Telling, undecided
+from emaviz.session.explore import Session
 from emaviz.session.inputs import Provenance
 from emaviz.session.jobs import Job, Signal, Tell, Worker
-from emaviz.session.session import Session
 
 # --- what the page hears of a discovery, besides its job --------------------------------------------------------------
 

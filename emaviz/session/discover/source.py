@@ -35,9 +35,9 @@ from ema_model.recordings.measurement import Sensors
 from ema_model.text import Document, Lines, Remark, Remarks, Severity
 from emaviz.session.compare import USUAL, Comparing
 from emaviz.session.data_folder import DataFolder, sanitised
+from emaviz.session.explore import Session
 from emaviz.session.inputs import Inputs, digest, listed, version_of
 from emaviz.session.jobs import Job, Signal, Tell
-from emaviz.session.session import Session
 from emaviz.session.settings import Settings, taken
 
 # --- what a session's file says of a discovery ------------------------------------------------------------------------

@@ -1,4 +1,4 @@
-"""The app without a screen: settings in, simulations and identifications out, on the compute thread."""
+"""Exploring without a screen: settings in, simulations, fans and identifications out, on the compute thread."""
 
 from __future__ import annotations
 
@@ -58,7 +58,7 @@ def fan_of(settings: Settings, actuator: Actuator, fault: int) -> Fan:
     return Fan(fault, k, tuple(sentences(one, actuator)[fault] for one in k), runs, note)
 
 
-# --- the app without a screen: settings in, simulations and identifications out, on the compute thread ----------------
+# --- what Explore shows, and the compute thread that all tabs share ---------------------------------------------------
 
 OWN_PLANT = "the actuator's file"
 

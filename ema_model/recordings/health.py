@@ -16,7 +16,7 @@ from ema_model.quantities.axes import SIGNALS
 from ema_model.quantities.numbers import amount
 from ema_model.quantities.titles import in_sentence
 from ema_model.recordings import noise as estimates
-from ema_model.recordings.columns import MappedColumn
+from ema_model.recordings.column_mapping import MappedColumn
 from ema_model.recordings.measurement import PHASES, Measurement
 from ema_model.recordings.noise import clock_drift, speed_lag
 from ema_model.text import Document, InWords, Lines

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ema_model.files.opened import refusal
-from ema_model.recordings.columns import ColumnMapping
+from ema_model.recordings.column_mapping import ColumnMapping
 from ema_model.recordings.measurement import Measurement
 
 Array = NDArray[np.float64]

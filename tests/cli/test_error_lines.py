@@ -17,7 +17,7 @@ from ema_model.effects import find
 from ema_model.effects.user import user_torque
 from ema_model.errors import InputError, did_you_mean, quoted
 from ema_model.recordings import ColumnMapping, MappedColumn
-from ema_model.recordings.columns import parse_mapping
+from ema_model.recordings.column_mapping import parse_mapping
 from ema_model.recordings.read import read_measurement
 from emaviz.cli import main
 from emaviz.session import session_file

@@ -19,7 +19,7 @@ from ema_model.recordings import (
     guess_mapping,
     parse_mapping,
 )
-from ema_model.recordings.columns import doubt
+from ema_model.recordings.column_guess import doubt
 from ema_model.recordings.read import read_measurement
 
 # header: the signal of each column in its order, with the unit where it is not the signal's own; - is left aside

@@ -11,7 +11,7 @@ import viser
 from ema_model.errors import InputError, quoted
 from ema_model.quantities.unit_conversion import known_units
 from ema_model.recordings import SIGNALS, ColumnMapping, MappedColumn
-from ema_model.recordings.columns import WITHOUT_DELAY
+from ema_model.recordings.column_mapping import WITHOUT_DELAY
 from ema_model.recordings.formats.text_layout import ENCODINGS, Hints
 from ema_model.recordings.health import Finding, Health
 from ema_model.text import COLOURS

@@ -12,7 +12,7 @@ import numpy as np
 from ema_model import faults
 from ema_model.campaign.store import Store, failed, summaries
 from emaviz.figures import campaign
-from emaviz.report.page import Figures, Section, page, pair, paragraph, table, write
+from emaviz.report.html_document import Figures, Section, page, pair, paragraph, table, write
 from emaviz.text.campaign import made_with
 
 

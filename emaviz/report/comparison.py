@@ -25,7 +25,7 @@ from ema_model.recordings.health import MARKS, Health
 from emaviz.figures import campaign, comparison
 from emaviz.figures import comparison as comparison_figures
 from emaviz.figures.comparison import time_ranges
-from emaviz.report.page import (
+from emaviz.report.html_document import (
     Figures,
     Section,
     blocks,

@@ -36,7 +36,7 @@ from ema_model.quantities.titles import in_sentence
 from ema_model.recordings import SIGNALS
 from emaviz import __version__
 from emaviz.figures import discovery
-from emaviz.report.page import (
+from emaviz.report.html_document import (
     Figures,
     Section,
     blocks,

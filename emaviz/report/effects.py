@@ -15,7 +15,7 @@ from ema_model.quantities.axes import Axes
 from ema_model.quantities.variables import VARIABLES
 from ema_model.simulation.with_effect import EffectRuns
 from emaviz.figures.discovery import effect_residual_legend, pictures
-from emaviz.report.page import escape, paragraph, table
+from emaviz.report.html_document import escape, paragraph, table
 from emaviz.text.html import mathml
 
 _STYLE = (

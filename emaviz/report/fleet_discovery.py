@@ -6,7 +6,7 @@ from pathlib import Path
 
 from ema_model.fleet.discovery import UnitsDiscovered, headline
 from emaviz.report.fleet import TransferMatrix, UnitParameters
-from emaviz.report.page import Figures, Section, WordsSection, page, write
+from emaviz.report.html_document import Figures, Section, WordsSection, page, write
 
 
 class Answer(WordsSection[UnitsDiscovered]):

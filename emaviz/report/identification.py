@@ -19,7 +19,7 @@ from ema_model.quantities.numbers import amount, number
 from emaviz import __version__
 from emaviz.figures import identification, theme
 from emaviz.figures.identification import colour, error_title, fault_bars
-from emaviz.report.page import Figures, Section, bullets, page, paragraph, table, write
+from emaviz.report.html_document import Figures, Section, bullets, page, paragraph, table, write
 from emaviz.text.results import sure_words
 
 

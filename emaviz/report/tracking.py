@@ -7,7 +7,7 @@ from pathlib import Path
 from ema_model.tracking.result import Tracked
 from ema_model.tracking.words import headline
 from emaviz.figures import tracking
-from emaviz.report.page import Figures, Section, WordsSection, page, pair, write
+from emaviz.report.html_document import Figures, Section, WordsSection, page, pair, write
 
 
 class Answer(WordsSection[Tracked]):

@@ -14,7 +14,7 @@ from emaviz.page.compare.result import headline
 from emaviz.page.discover.result import answer
 from emaviz.report.comparison import Answer
 from emaviz.report.discovery import Verdict
-from emaviz.report.page import Figures
+from emaviz.report.html_document import Figures
 from emaviz.text.results import MEANINGS, of_discovery, of_units
 
 GREEN = MEANINGS["good"]

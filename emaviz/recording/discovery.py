@@ -29,8 +29,8 @@ from ema_model.estimation.floor import BAND_SIGMAS
 from ema_model.text import Block, Lines, Note
 from emaviz import colours
 from emaviz.recording import writer as drawn_as
+from emaviz.recording.blueprint import Contents, arranged, plot, signal_view
 from emaviz.recording.entry import RecordingError, configured
-from emaviz.recording.layout import Contents, arranged, plot, signal_view
 from emaviz.recording.style import GROUP_COLOURS, ITERATION, plain, series_title
 from emaviz.recording.writer import RecordingWriter, written
 

@@ -446,7 +446,7 @@ def _recover(part: Path) -> Recovered:
 
 
 def _blueprint(recording: Recording) -> Any:
-    from emaviz.recording.layout import Algorithm, Contents, build  # rerun takes a second to import
+    from emaviz.recording.blueprint import Algorithm, Contents, build  # rerun takes a second to import
 
     contents = Contents(
         signals={group: list(signals) for group, signals in recording.signals.items()},

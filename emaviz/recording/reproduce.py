@@ -24,10 +24,10 @@ from ema_model.campaign.thesis import (
 )
 from ema_model.errors import InputError
 from emaviz import colours
-from emaviz.recording import layout, style
+from emaviz.recording import blueprint, style
 from emaviz.recording import writer as drawn_as
+from emaviz.recording.blueprint import Array, Chart, plot
 from emaviz.recording.entry import RecordingError
-from emaviz.recording.layout import Array, Chart, plot
 from emaviz.recording.style import algorithm_colour, signal_title
 from emaviz.recording.writer import RecordingWriter, escaped
 from emaviz.text.reproduce import NAMES, answer, coefficient_table, row_table
@@ -89,11 +89,11 @@ class ReproductionWriter(RecordingWriter):
             for place, (name, curve) in enumerate(curves.items(), 1):
                 colour = algorithm_colour(name)
                 named = place * last // (len(curves) + 1)  # each at another place: the curves come to lie together
-                there = layout.name_at(chart.strip([named], [curve[1, named]])[0], NAMES[name], colour)
+                there = blueprint.name_at(chart.strip([named], [curve[1, named]])[0], NAMES[name], colour)
                 self._file.do(lambda stream, at=f"{root}/{name}/name", there=there: stream.log(at, there, static=True))
                 for (what, _, width), values in zip(_PERCENTILES, curve):
                     strip = chart.strip(np.arange(len(values)), values)
-                    drawn = layout.model(strip, colour, width)
+                    drawn = blueprint.model(strip, colour, width)
                     self._file.do(
                         lambda stream, at=f"{root}/{name}/{what}", one=drawn: stream.log(at, one, static=True)
                     )
@@ -126,7 +126,7 @@ class ReproductionWriter(RecordingWriter):
             first = sorted(self._searched, key=lambda case: case != MULTIPLE)
             tabs.append(
                 rrb.Grid(
-                    *[layout.view(_title(case), [f"{ROOT}/convergence/{case}/**"]) for case in first],
+                    *[blueprint.view(_title(case), [f"{ROOT}/convergence/{case}/**"]) for case in first],
                     name="Convergence (log10 RMSE [A], iterations)",
                 )
             )

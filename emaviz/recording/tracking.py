@@ -16,8 +16,8 @@ from ema_model.quantities.numbers import HALF_90
 from ema_model.tracking.result import Tracked
 from ema_model.tracking.summary import as_dict
 from emaviz.recording import writer as drawn_as
+from emaviz.recording.blueprint import plot
 from emaviz.recording.entry import RecordingError
-from emaviz.recording.layout import plot
 from emaviz.recording.style import GROUP_COLOURS, K_TITLES
 from emaviz.recording.writer import RecordingWriter, escaped
 

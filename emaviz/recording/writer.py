@@ -20,9 +20,9 @@ from rerun.error_utils import catch_and_log_exceptions
 
 from ema_model.identification.run import algorithm_title
 from ema_model.text import Block, Facts, Lines, Note, Remarks
-from emaviz.recording import layout, style
+from emaviz.recording import blueprint, style
+from emaviz.recording.blueprint import Algorithm, Chart, Contents, build, send
 from emaviz.recording.entry import MIN_FREE_BYTES, RecordingError, claim, free_bytes, part_of
-from emaviz.recording.layout import Algorithm, Chart, Contents, build, send
 from emaviz.recording.style import APPLICATION, ITERATION, K_NAMES, Colour, algorithm_path
 
 # --- one .rrd file while it is written: its stream, its lock, its failures and its end --------------------------------
@@ -461,18 +461,18 @@ class RecordingWriter:
     def fit(self, signal: str, time_s: ArrayLike, measured: ArrayLike, algorithms: Sequence[str]) -> None:
         """The measured curve (n,) of a signal that `fit_iteration` draws a model beside, and its axes."""
         chart = Chart.of(signal, time_s, measured)
-        drawn = layout.measured(chart.strip(time_s, measured))
+        drawn = blueprint.measured(chart.strip(time_s, measured))
         with self._file.lock:
             self._contents.charts[style.plain(signal)] = chart
-            self._file.do(lambda stream: chart.log_axes(stream, layout.axes_path(signal)))
-            for path in [layout.fit_path(name, signal, "measured") for name in algorithms]:
+            self._file.do(lambda stream: chart.log_axes(stream, blueprint.axes_path(signal)))
+            for path in [blueprint.fit_path(name, signal, "measured") for name in algorithms]:
                 self._file.do(lambda stream, path=path: stream.log(path, drawn, static=True))
 
     def fit_iteration(self, algorithm: str, index: int, signal: str, time_s: ArrayLike, values: ArrayLike) -> None:
         """The best individual's curve (n,) on this iteration; `fit` has given the signal its axes."""
         colour = style.algorithm_colour(algorithm)
-        columns = layout.model_columns(self._contents.charts[signal].strip(time_s, values), colour)
-        path, time = layout.fit_path(algorithm, signal, "model"), [rr.TimeColumn(style.ITERATION, sequence=[index])]
+        columns = blueprint.model_columns(self._contents.charts[signal].strip(time_s, values), colour)
+        path, time = blueprint.fit_path(algorithm, signal, "model"), [rr.TimeColumn(style.ITERATION, sequence=[index])]
         self._file.do(lambda stream: stream.send_columns(path, time, columns))
 
     def curve(self, signal: str, which: str, time_s: ArrayLike, values: ArrayLike) -> None:
@@ -481,10 +481,10 @@ class RecordingWriter:
             chart = self._contents.curves.get(signal)
             if chart is None:
                 chart = self._contents.curves[style.plain(signal)] = Chart.of(signal, time_s, values)
-                self._file.do(lambda stream: chart.log_axes(stream, f"{layout.CURVES}/{signal}"))
+                self._file.do(lambda stream: chart.log_axes(stream, f"{blueprint.CURVES}/{signal}"))
             points = chart.strip(time_s, values)
-            drawn = layout.measured(points) if which == "measured" else layout.model(points, _MODEL)
-            self._file.do(lambda stream: stream.log(f"{layout.CURVES}/{signal}/{which}", drawn, static=True))
+            drawn = blueprint.measured(points) if which == "measured" else blueprint.model(points, _MODEL)
+            self._file.do(lambda stream: stream.log(f"{blueprint.CURVES}/{signal}/{which}", drawn, static=True))
 
     def answer(self, markdown: str) -> None:
         """The answer in words, on the dashboard."""

@@ -105,7 +105,7 @@ def _configuration(task: Task) -> dict[str, Any]:
 
 
 def _identified(task: Task, it: TaskInputs, path: Path, tell: Tell) -> None:
-    from emaviz.recording.story import IdentificationStory
+    from emaviz.recording.identification import IdentificationStory
 
     own = msgspec.convert(task.settings, KINDS["identify"].settings)
     objective = Objective(it.fitted, it.actuator, circuit=own.circuit, fitness=own.fitness)

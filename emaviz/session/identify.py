@@ -28,7 +28,7 @@ from emaviz.session.jobs import Job, Run, Signal, Steps, Worker
 from emaviz.session.settings import SLIDERS, Settings, title
 
 if TYPE_CHECKING:
-    from emaviz.recording.story import IdentificationStory
+    from emaviz.recording.identification import IdentificationStory
 
 # --- a race of optimisers: the same recording, one iteration of each in turn, told and recorded as it goes ------------
 
@@ -409,7 +409,7 @@ class Identifying:
         source = "reference" if race.truth is not None else "measurement"
         try:
             from emaviz.recording.entry import free_name
-            from emaviz.recording.story import IdentificationStory
+            from emaviz.recording.identification import IdentificationStory
 
             path = free_name(self._folder, stem, ".rrd")
             return IdentificationStory(

@@ -50,7 +50,7 @@ def hide_rerun(monkeypatch):
         return plain(name, *rest, **options)
 
     for name in [
-        name for name in sys.modules if name.startswith(("emaviz.recording.story", "emaviz.recording.writer"))
+        name for name in sys.modules if name.startswith(("emaviz.recording.identification", "emaviz.recording.writer"))
     ]:
         monkeypatch.delitem(sys.modules, name)
     monkeypatch.setattr(builtins, "__import__", refuse)

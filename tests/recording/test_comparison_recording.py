@@ -12,8 +12,8 @@ from support.comparison_by_hand import comparison as by_hand
 
 from ema_model.errors import InputError
 from emaviz.recording import read
+from emaviz.recording.blueprint import Contents, build
 from emaviz.recording.comparison import write_comparison
-from emaviz.recording.layout import Contents, build
 
 
 @pytest.fixture(scope="module")

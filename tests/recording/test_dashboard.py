@@ -8,7 +8,7 @@ import rerun.blueprint as rrb
 from rerun.chunk import RrdReader
 
 from emaviz.recording import RecordingWriter
-from emaviz.recording.layout import POINTS, Chart, Contents, axes_path, build, fit_path, plot, view
+from emaviz.recording.blueprint import POINTS, Chart, Contents, axes_path, build, fit_path, plot, view
 
 TIME = np.linspace(0.0, 0.5, 5001)
 CURRENT = 4.0 * np.sin(40.0 * TIME)

@@ -218,7 +218,7 @@ class _Recorder:
     ) -> None:
         from emaviz.cli import output
         from emaviz.recording import RecordingError
-        from emaviz.recording.story import IdentificationStory
+        from emaviz.recording.identification import IdentificationStory
 
         source = "measurement" if arguments.files else "reference"
         try:

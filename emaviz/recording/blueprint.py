@@ -1,4 +1,4 @@
-"""How a recording opens: curves that follow the iteration, the dashboard, the layout that is stored in it."""
+"""The blueprint of a recording: how it opens, its dashboard, and curves that follow the iteration."""
 
 from __future__ import annotations
 

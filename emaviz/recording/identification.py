@@ -1,4 +1,4 @@
-"""An identification told as a recording: what was measured, how the search went, what it found."""
+"""An identification as a recording: what was measured, how the search went, what it found."""
 
 from __future__ import annotations
 

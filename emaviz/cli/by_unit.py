@@ -17,7 +17,7 @@ from ema_model.files.opened import FILE_BYTES, listed
 from ema_model.fleet.folders import check_same_type
 from ema_model.recordings import Measurement, read_header
 from ema_model.recordings.recording_set import RUN, held_out, is_pattern
-from emaviz.cli import flow, given, output
+from emaviz.cli import flow, option_values, output
 
 _BY_FOLDER = ("unit", "folder")
 _NOT_OF_UNITS = {"record": None, "calibrate": True, "signals": None, "fault": []}  # with their defaults
@@ -31,7 +31,7 @@ def run(arguments: argparse.Namespace, actuator: Actuator) -> int:
     from ema_model.fleet.result import as_dict
 
     _refuse(arguments, _NOT_OF_UNITS)
-    actuator = replace(actuator, effects={**actuator.effects, **given.effects_of(arguments, actuator.axes)})
+    actuator = replace(actuator, effects={**actuator.effects, **option_values.effects_of(arguments, actuator.axes)})
 
     def compute(fitted: Units, held: Units, progress: output.Progress) -> flow.Answer:
         result = compare_units(
@@ -84,7 +84,7 @@ def _refuse(arguments: argparse.Namespace, options: Iterable[str]) -> None:
 
 def read_units(arguments: argparse.Namespace, actuator: Actuator, progress: output.Progress) -> tuple[Units, Units]:
     """The recordings to fit and those held out, by unit; InputError where it is not clear whose one is."""
-    given_files, unseen = given.files_to_read(arguments, in_folders=True)
+    given_files, unseen = option_values.files_to_read(arguments, in_folders=True)
     named = {Path(file).resolve() for file in unseen}
     files = list(dict.fromkeys([*given_files, *unseen]))
     check_same_type(files)
@@ -94,7 +94,7 @@ def read_units(arguments: argparse.Namespace, actuator: Actuator, progress: outp
         arguments.runs = column
     fitted: Units = {}
     held: Units = {}
-    for file, found in given.read_each(files, arguments, actuator, progress):
+    for file, found in option_values.read_each(files, arguments, actuator, progress):
         for one in found:
             unit = f"{column} {one.name.rpartition(RUN)[2]}" if column else _unit_of(file, one.name, arguments.unit)
             (held if Path(file).resolve() in named else fitted).setdefault(unit, []).append(one)
@@ -119,7 +119,7 @@ def _column(arguments: argparse.Namespace, files: list[str]) -> str:
         raise InputError("--by names a column, and --unit patterns: give one of them")
     if arguments.unit:
         return ""
-    columns = read_header(files[0], FILE_BYTES, given.hints_of(arguments))
+    columns = read_header(files[0], FILE_BYTES, option_values.hints_of(arguments))
     if arguments.by in columns:
         if arguments.runs:
             raise InputError("--runs and --by COLUMN both cut the files into runs; give one of them")

@@ -13,7 +13,7 @@ from typing import Any, TypeVar
 
 from ema_model.actuator import Actuator, save_actuator
 from ema_model.errors import InputError
-from emaviz.cli import given, output
+from emaviz.cli import option_values, output
 from emaviz.cli.ending import ExitCode
 
 Write = Callable[[str, Mapping[str, Any]], None]  # a file's path, and the options that the answer was computed with
@@ -39,7 +39,7 @@ def run(
     arguments: argparse.Namespace,
     actuator: Actuator,
     compute: Callable[[Read, Read, output.Progress], Answer],
-    read: Callable[[argparse.Namespace, Actuator, output.Progress], tuple[Read, Read]] = given.read_set,
+    read: Callable[[argparse.Namespace, Actuator, output.Progress], tuple[Read, Read]] = option_values.read_set,
 ) -> ExitCode:
     """Reads what is fitted and what is held out, computes, and finishes."""
     progress = output.Progress(arguments)

@@ -17,7 +17,7 @@ from ema_model.errors import InputError
 from ema_model.recordings.read import read_measurement
 from ema_model.simulation.run import Run, simulate_monitor
 from emaviz.cli import main
-from emaviz.cli.given import split_at_commas
+from emaviz.cli.option_values import split_at_commas
 
 OWN = """
 [effects.user_torque]

@@ -54,16 +54,16 @@ def run(arguments: argparse.Namespace) -> int:
     """Compares, and of units what they differ in."""
     if arguments.save_actuator and not arguments.calibrate:
         raise InputError("--save-actuator writes what the calibration found; leave --no-calibrate out")
-    from emaviz.cli import flow, given
+    from emaviz.cli import flow, option_values
 
-    actuator = given.actuator_of(arguments)
+    actuator = option_values.actuator_of(arguments)
     if arguments.by or arguments.unit:
         from emaviz.cli import by_unit
 
         return by_unit.run(arguments, actuator)
-    k, weights = given.faults_of(arguments, actuator.faults), given.weights_of(arguments.signals)
-    effects = given.effects_of(arguments, actuator.axes)
-    to_fit = given.effects_to_fit(arguments) if arguments.calibrate else []
+    k, weights = option_values.faults_of(arguments, actuator.faults), option_values.weights_of(arguments.signals)
+    effects = option_values.effects_of(arguments, actuator.axes)
+    to_fit = option_values.effects_to_fit(arguments) if arguments.calibrate else []
 
     def compute(fitted: list[Measurement], held: list[Measurement], progress: output.Progress) -> flow.Answer:
         from ema_model.comparison import as_dict, compare  # takes a second: recordings are refused before

@@ -40,9 +40,9 @@ def documents() -> tuple[type, ...]:
 
 def run(arguments: argparse.Namespace) -> int:
     """Discovers, and of units what they lack; once interrupted, what was found so far."""
-    from emaviz.cli import flow, given
+    from emaviz.cli import flow, option_values
 
-    actuator = given.actuator_of(arguments)
+    actuator = option_values.actuator_of(arguments)
     signals = _CURRENT_ONLY if arguments.signals == "current" else None
     if arguments.by or arguments.unit:
         from emaviz.cli import by_unit

@@ -59,19 +59,19 @@ def documents() -> tuple[type, ...]:
 def run(arguments: argparse.Namespace) -> int:
     """Identifies; once interrupted, the best so far."""
     from ema_model.actuator.file import check_represents
-    from emaviz.cli import flow, given
+    from emaviz.cli import flow, option_values
 
-    actuator = given.actuator_of(arguments)
-    effects = given.effects_of(arguments, actuator.axes)
+    actuator = option_values.actuator_of(arguments)
+    effects = option_values.effects_of(arguments, actuator.axes)
     for name in effects:
         check_represents(actuator, name)
-    to_fit = given.effects_to_fit(arguments) if arguments.files else []
+    to_fit = option_values.effects_to_fit(arguments) if arguments.files else []
     given_values = {name: settings for name, settings in effects.items() if name not in to_fit}
     actuator = replace(actuator, effects={**actuator.effects, **given_values})
-    truth = given.faults_of(arguments) if arguments.fault or not arguments.files else None
+    truth = option_values.faults_of(arguments) if arguments.fault or not arguments.files else None
 
     def read(*of: Any) -> tuple[list[Measurement], list[Measurement]]:
-        fitted, held = given.read_set(*of)
+        fitted, held = option_values.read_set(*of)
         return fitted or [_simulated(arguments, actuator, truth)], held
 
     def compute(fitted: list[Measurement], held: list[Measurement], progress: output.Progress) -> flow.Answer:
@@ -192,11 +192,11 @@ def _simulated(arguments: argparse.Namespace, actuator: Actuator, truth: np.ndar
     assert truth is not None
     from ema_model.recordings.measurement import Sensors
     from ema_model.simulation.plant import simulated
-    from emaviz.cli import given
+    from emaviz.cli import option_values
 
     sensors = Sensors(arguments.noise_current, arguments.encoder_bits)
     try:
-        clean = simulated(given.run_of(arguments, actuator), actuator, truth, arguments.fitness)
+        clean = simulated(option_values.run_of(arguments, actuator), actuator, truth, arguments.fitness)
     except FloatingPointError as error:
         raise InputError(str(error)) from None
     return sensors.record(clean, arguments.seed)

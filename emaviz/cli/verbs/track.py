@@ -63,10 +63,10 @@ def run(arguments: argparse.Namespace) -> int:
 
     Once interrupted, what the flights so far say.
     """
-    from emaviz.cli import given, output
+    from emaviz.cli import option_values, output
 
     thresholds = _thresholds(arguments.threshold)
-    actuator = given.actuator_of(arguments)
+    actuator = option_values.actuator_of(arguments)
     progress = output.Progress(arguments)
     try:
         if arguments.watch:
@@ -100,15 +100,15 @@ def _identified(
     paths: Sequence[Path], arguments: argparse.Namespace, actuator: Actuator, progress: output.Progress
 ) -> Iterator[Flight]:
     from ema_model.tracking.flights import identify_all
-    from emaviz.cli import given
+    from emaviz.cli import option_values
 
     return identify_all(
         paths,
-        lambda path: given.read_one(str(path), arguments, actuator, progress),
+        lambda path: option_values.read_one(str(path), arguments, actuator, progress),
         actuator,
         arguments.seed,
         lambda number, name: progress.show(f"flight {number + 1} of {len(paths)}: {name}", number / len(paths)),
-        lambda line: given.say(line, progress),
+        lambda line: option_values.say(line, progress),
     )
 
 
@@ -151,7 +151,7 @@ def _watch(
     from ema_model.recordings.recording_set import recordings_in
     from ema_model.tracking.evidence import LEAST_FLIGHTS
     from ema_model.tracking.flights import check_order, in_order
-    from emaviz.cli import given
+    from emaviz.cli import option_values
 
     folder = Path(arguments.files[0])
     if len(arguments.files) > 1 or not folder.is_dir():
@@ -168,7 +168,7 @@ def _watch(
                     check_order(in_order([*flights, path]))
                     flights |= zip([path], _identified([path], arguments, actuator, progress))
                 except InputError as error:
-                    given.say(f"{error}; left out", progress)
+                    option_values.say(f"{error}; left out", progress)
             if len(flights) < LEAST_FLIGHTS:
                 progress.show(f"{len(flights)} of the {LEAST_FLIGHTS} flights that a trend needs")
             elif any(path in flights for path in new):
@@ -182,11 +182,11 @@ def _thresholds(texts: list[str]) -> dict[str, float]:
     if not texts:
         return {}
     from ema_model.tracking.track import check_thresholds
-    from emaviz.cli import given
+    from emaviz.cli import option_values
 
     found: dict[str, float] = {}
     for text in texts:
-        name, value = given.pair(text, "--threshold")
+        name, value = option_values.pair(text, "--threshold")
         if name in found:
             raise InputError(f"--threshold {name}: given twice; write it once")
         found[name] = value

@@ -59,11 +59,11 @@ def _beside(actuator: Actuator, arguments: argparse.Namespace) -> dict[str, list
     """What the recording and a calibration by it say."""
     from ema_model.actuator.actuator import usual_filter
     from ema_model.actuator.parameters import on_axes
-    from emaviz.cli import given, output
+    from emaviz.cli import option_values, output
 
     progress = output.Progress(arguments)
     try:
-        recording = given.read_one(arguments.recording, arguments, actuator, progress)
+        recording = option_values.read_one(arguments.recording, arguments, actuator, progress)
         from ema_model.comparison import compare  # takes a second: recordings are refused before
 
         result = compare([recording], actuator, on_progress=progress.show)

@@ -180,11 +180,11 @@ def _effect(text: str) -> tuple[str, dict[str, Any]]:
     """The table of --effect NAME:param=value±tolerance,…"""
     from ema_model.actuator.describe import entry_of, number_of
     from ema_model.effects.user.entries import kind_of
-    from emaviz.cli import given
+    from emaviz.cli import option_values
 
     name, _, rest = text.partition(":")
     table: dict[str, Any] = {}
-    for part in given.split_at_commas(rest):
+    for part in option_values.split_at_commas(rest):
         key, separator, value = (piece.strip() for piece in part.partition("="))
         where = f"--effect {quoted(name)}: {quoted(key)}"
         if not separator:
@@ -194,7 +194,7 @@ def _effect(text: str) -> tuple[str, dict[str, Any]]:
         if kind_of(name) and key in _TEXTS:
             table[key] = value
         elif kind_of(name) and key == "values":
-            table[key] = [entry_of(one, where) for one in given.split_at_commas(value.strip("[]"))]
+            table[key] = [entry_of(one, where) for one in option_values.split_at_commas(value.strip("[]"))]
         else:
             table[key] = (number_of if kind_of(name) == "torque_curve" else entry_of)(value, where)
     return name, table
@@ -202,7 +202,7 @@ def _effect(text: str) -> tuple[str, dict[str, Any]]:
 
 def _rule(text: str) -> dict[str, Any]:
     from ema_model.actuator.describe import number_of
-    from emaviz.cli import given
+    from emaviz.cli import option_values
 
     pattern, separator, rest = text.partition(":")
     if not separator or not rest:
@@ -210,7 +210,7 @@ def _rule(text: str) -> dict[str, Any]:
     if rest in ("map", "run"):
         return {"match": pattern, "kind": rest}
     values = {}
-    for part in given.split_at_commas(rest):
+    for part in option_values.split_at_commas(rest):
         path, _, value = part.partition("=")
         values[path.strip()] = number_of(value, f"--where {quoted(path)}")
     return {"match": pattern, "set": values}

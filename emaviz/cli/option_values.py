@@ -1,4 +1,4 @@
-"""What the shared options give: the actuator, recordings, faults, effects, weights, and the run."""
+"""The values of shared options: the actuator, recordings, faults, effects, weights, and the run that is asked for."""
 
 from __future__ import annotations
 

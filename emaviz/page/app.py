@@ -19,15 +19,15 @@ from ema_model.members import classes_in, members
 from ema_model.simulation import plant
 from emaviz.page import compare, explore
 from emaviz.page.charts import add_chart_tools
-from emaviz.page.docked import LEFT_PX, Docked
 from emaviz.page.explore.tab import ExploreTab
 from emaviz.page.panel import follow_theme
 from emaviz.page.playback import PlaybackStrip
 from emaviz.page.tab import AnyTab, Shared, Standings, Tab
+from emaviz.page.window_layout import LEFT_PX, Docked
 from emaviz.page.workspaces import Page, Workspace, Workspaces
 from emaviz.recording.viewer import ViewerHost
 from emaviz.scene.actuator import ActuatorScene
-from emaviz.server.door import Door
+from emaviz.server.access import Door
 from emaviz.server.safe_server import open_server
 from emaviz.server.uploads import Uploads
 from emaviz.server.viser_private import Inside

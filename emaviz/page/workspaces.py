@@ -12,11 +12,11 @@ from typing import Any
 import viser
 
 from ema_model.errors import InputError
-from emaviz.page import charts, docked
+from emaviz.page import charts, window_layout
 from emaviz.page.charts import ChartHeights
-from emaviz.page.docked import Docked
 from emaviz.page.style import unseen
-from emaviz.server.beside import say_beside
+from emaviz.page.window_layout import Docked
+from emaviz.server.field_error import say_beside
 from emaviz.server.viser_private import Inside, id_of
 from emaviz.session.explore import Session
 from emaviz.session.jobs import Signal, Worker
@@ -204,7 +204,7 @@ class Workspaces:
             button.on_click(lambda event, name=name: event.client and self._came(event.client, name))
         sizes: dict[str, list[dict[str, Any]]] = {}
         fits: list[tuple[str, Sequence[int], Callable[[int, int], None]]] = [
-            ("innerWidth", docked.WINDOWS_PX, self._fit_width),
+            ("innerWidth", window_layout.WINDOWS_PX, self._fit_width),
             ("innerHeight", charts.WINDOWS_PX, self.heights.fit),
         ]
         for side, steps, fit in fits:
@@ -220,7 +220,7 @@ class Workspaces:
             {"name": name, "title": one.title, "inset": one.inset, "lower": one.lower, "button": id_of(buttons[name])}
             for name, one in self._members.items()
         ]
-        self._inside.run(docked.script())
+        self._inside.run(window_layout.script())
         script = _SCRIPT.replace("VIEWS", json.dumps(views)).replace("SIZES", json.dumps(sizes))
         self._inside.run(script.replace("FIRST", json.dumps(self.first)))
         self.in_front.connect()

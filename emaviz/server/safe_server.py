@@ -25,7 +25,7 @@ from websockets.datastructures import Headers
 from websockets.http11 import Request, Response
 
 from ema_model.errors import InputError
-from emaviz.server.door import Complaints, Door, Gate, protect
+from emaviz.server.access import Complaints, Door, Gate, protect
 from emaviz.server.messages import LARGEST_FRAME
 from emaviz.server.viser_private import keep_icons
 

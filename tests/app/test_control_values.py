@@ -147,7 +147,7 @@ def test_what_is_refused_is_sent_back(controls, raw):
 
 
 def test_a_number_on_its_way_into_its_bounds_is_left_to_be_typed(controls, raw, monkeypatch):
-    monkeypatch.setattr("emaviz.server.door.TYPING_S", 0.3)
+    monkeypatch.setattr("emaviz.server.access.TYPING_S", 0.3)
     number = controls["number"]
     for typed in (-2e9, -2e10, 60, 6.5):
         raw.update(uuid(number), typed)

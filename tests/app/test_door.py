@@ -13,7 +13,7 @@ from support.raw_page import RawPage
 from ema_model.errors import InputError
 from emaviz.cli import main
 from emaviz.page.app import App
-from emaviz.server.door import Door, is_loopback
+from emaviz.server.access import Door, is_loopback
 from emaviz.server.safe_server import open_server
 
 

@@ -14,8 +14,8 @@ from support.on_page import field, wait_until
 from support.raw_page import CAMERA, RawPage
 
 from ema_model.recordings import write_measurement
-from emaviz.server import door
-from emaviz.server.door import TYPING_S
+from emaviz.server import access
+from emaviz.server.access import TYPING_S
 from emaviz.server.messages import MOST_INT, checked
 from emaviz.server.viser_private import Inside
 
@@ -240,7 +240,7 @@ def test_a_choice_that_is_taken_away_while_a_page_makes_it_is_not_kept(app, raw,
             choice.options = ("c", "d")
         return taken
 
-    monkeypatch.setattr(door, "checked", late)
+    monkeypatch.setattr(access, "checked", late)
     raw.update(choice._impl.uuid, "b")
     heard(raw, marker)
     wait_until(lambda: choice.value == "c", 20.0)

@@ -14,7 +14,7 @@ from websockets.exceptions import InvalidStatus
 from websockets.sync.client import connect
 
 from emaviz.server import messages
-from emaviz.server.door import Complaints
+from emaviz.server.access import Complaints
 from emaviz.server.safe_server import open_server
 
 DEEP = b"\x83\xa4type\xb0GuiUpdateMessage\xa4uuid\xa1x\xa7updates\x81\xa5value" + b"\x91" * 100_000
@@ -128,7 +128,7 @@ def test_a_flood_prints_a_few_lines(server, capfd):
 
 def test_what_was_not_printed_is_counted(capfd, monkeypatch):
     now = [1000.0]
-    monkeypatch.setattr("emaviz.server.door.time.monotonic", lambda: now[0])
+    monkeypatch.setattr("emaviz.server.access.time.monotonic", lambda: now[0])
     complain = Complaints()
     for number in range(50):
         complain(f"line\n{number}\x1b[31m" + "x" * 1000)

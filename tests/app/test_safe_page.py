@@ -8,7 +8,7 @@ import threading
 import pytest
 from support.on_page import field, wait_until
 
-from emaviz.server.door import Door
+from emaviz.server.access import Door
 from emaviz.server.safe_server import open_server
 
 pytestmark = pytest.mark.browser

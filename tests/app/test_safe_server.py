@@ -7,7 +7,7 @@ import http.client
 import pytest
 
 from ema_model.errors import InputError
-from emaviz.server.door import Door
+from emaviz.server.access import Door
 from emaviz.server.safe_server import open_server
 
 

@@ -1,4 +1,4 @@
-"""An error beside its field: a line below the control, in the page, that stays until the control is changed again."""
+"""An error beside its field: a line below the control, in the page, until the control is changed again."""
 
 from __future__ import annotations
 

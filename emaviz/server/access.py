@@ -23,7 +23,7 @@ from websockets.exceptions import ConnectionClosed
 from ema_model.errors import InputError
 from ema_model.files.opened import shown
 from emaviz.server import messages
-from emaviz.server.beside import say_beside
+from emaviz.server.field_error import say_beside
 from emaviz.server.messages import Refused, checked
 from emaviz.server.viser_private import Inside
 

@@ -12,7 +12,7 @@ import viser
 from numpy.typing import NDArray
 
 from emaviz.figures.runs import LEAST_SPACE_PX
-from emaviz.page.docked import LEFT_PX, TWO_COLUMNS_PX
+from emaviz.page.window_layout import LEFT_PX, TWO_COLUMNS_PX
 from emaviz.server.viser_private import Inside, id_of
 from emaviz.text.html import Html, unescaped
 

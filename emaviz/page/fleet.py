@@ -10,9 +10,9 @@ import viser
 
 from ema_model.fleet.result import UnitsCompared, document_of, lacking, notes, rests_on, sentences
 from emaviz.figures import fleet
-from emaviz.page.docked import COLUMNS, NEXT_COLUMN, PLOTS_EARLY
 from emaviz.page.panel import REPORT, FolderChoice, JobLine, KeepButtons, Keeps, PracticeButtons, Seal
 from emaviz.page.tab import Shared, Standing, Tab
+from emaviz.page.window_layout import COLUMNS, NEXT_COLUMN, PLOTS_EARLY
 from emaviz.page.workspaces import Page, Workspace
 from emaviz.session.fleet import TYPE, ComparingUnits
 from emaviz.session.session_file import Part

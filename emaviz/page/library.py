@@ -12,11 +12,11 @@ from ema_model.faults import HEALTHY
 from ema_model.simulation.with_effect import RUNS, WithEffect
 from emaviz.figures.discovery import EffectCharts, picture, small_picture
 from emaviz.page.discover.candidate import about
-from emaviz.page.docked import COLUMNS, NEXT_COLUMN
 from emaviz.page.panel import JobLine
 from emaviz.page.playback import PlaybackStrip
 from emaviz.page.style import LONG_LABELS
 from emaviz.page.tab import Shared, Tab
+from emaviz.page.window_layout import COLUMNS, NEXT_COLUMN
 from emaviz.page.workspaces import Page, Workspace
 from emaviz.scene.playback import motion
 from emaviz.server.viser_private import selector_of

@@ -18,9 +18,9 @@ from ema_model.recordings import SIGNALS, Measurement
 from emaviz.figures import comparison, runs
 from emaviz.figures.identification import named
 from emaviz.page.campaigns import CampaignControls
-from emaviz.page.docked import COLUMNS
 from emaviz.page.panel import recording_link
 from emaviz.page.tab import Shared, Tab
+from emaviz.page.window_layout import COLUMNS
 from emaviz.page.workspaces import Page, Workspace
 from emaviz.recording.entry import Entry, error_said, setting
 from emaviz.recording.read import Recording

@@ -21,7 +21,6 @@ from ema_model.tracking.words import headline, hindsight
 from emaviz.figures import tracking
 from emaviz.figures.tracking import CLICKED
 from emaviz.page.compare import WORKSPACE as COMPARE
-from emaviz.page.docked import COLUMNS, NEXT_COLUMN
 from emaviz.page.panel import (
     RECORD,
     REPORT,
@@ -36,6 +35,7 @@ from emaviz.page.panel import (
 )
 from emaviz.page.style import LONG_LABELS, unseen_field
 from emaviz.page.tab import Shared, Standing, Tab
+from emaviz.page.window_layout import COLUMNS, NEXT_COLUMN
 from emaviz.page.workspaces import Page, Workspace
 from emaviz.recording.viewer import ViewerHost
 from emaviz.server.viser_private import Inside, id_of

@@ -8,9 +8,9 @@ from typing import Any
 import pytest
 
 from emaviz.figures.runs import LEAST_SPACE_PX, value_axis
-from emaviz.page import docked
+from emaviz.page import window_layout
 from emaviz.page.charts import ChartHeights, spaced
-from emaviz.page.docked import TWO_COLUMNS_PX
+from emaviz.page.window_layout import TWO_COLUMNS_PX
 
 
 def test_values_keep_a_distance_in_proportion_to_the_height():
@@ -33,7 +33,7 @@ class Pages:
 
 
 def test_a_window_that_has_just_two_columns_is_told_from_one_that_has_not():
-    assert TWO_COLUMNS_PX in docked.WINDOWS_PX
+    assert TWO_COLUMNS_PX in window_layout.WINDOWS_PX
 
 
 def test_a_figure_takes_what_its_column_has_between_what_it_needs_and_what_fills_it():

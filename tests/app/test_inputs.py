@@ -22,7 +22,7 @@ from emaviz.session.campaigns import Campaigns
 from emaviz.session.compare import Comparing
 from emaviz.session.data_folder import DataFolder
 from emaviz.session.discover.discovering import Discovering
-from emaviz.session.discover.stories import Entry
+from emaviz.session.discover.history import Entry
 from emaviz.session.explore import Session
 from emaviz.session.fleet import ComparingUnits
 from emaviz.session.inputs import Inputs, Provenance, results_part

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from support.on_page import wait_until
 
-from emaviz.page.docked import LEFT_PX
 from emaviz.page.identify.tab import IdentifyTab
+from emaviz.page.window_layout import LEFT_PX
 from emaviz.recording import read
 
 pytestmark = pytest.mark.browser

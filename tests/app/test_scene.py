@@ -19,8 +19,8 @@ from ema_model.commands import command
 from ema_model.faults import vector
 from ema_model.simulation.run import Run, simulate_reference
 from emaviz.page.app import tabs
-from emaviz.page.docked import LEFT_PX, _width_px
 from emaviz.page.style import STRIP_HEIGHT_PX
+from emaviz.page.window_layout import LEFT_PX, _width_px
 from emaviz.scene import actuator as actuator_scene
 from emaviz.scene import solids
 from emaviz.scene.actuator import _NAMES, NAMED_AT, ActuatorScene

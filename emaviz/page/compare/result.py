@@ -24,10 +24,10 @@ from emaviz.figures import comparison as comparison_figures
 from emaviz.figures.theme import why_missing
 from emaviz.page.compare import WORKSPACE
 from emaviz.page.compare.files import RawLines
-from emaviz.page.docked import ALL_COLUMNS, COLUMNS, NEXT_COLUMN, PLOTS_EARLY, ROOM
 from emaviz.page.panel import Cleared
 from emaviz.page.playback import PlaybackStrip
 from emaviz.page.style import IN_PAIRS
+from emaviz.page.window_layout import ALL_COLUMNS, COLUMNS, NEXT_COLUMN, PLOTS_EARLY, ROOM
 from emaviz.page.workspaces import Page
 from emaviz.scene.playback import Motion, motion
 from emaviz.server.viser_private import selector_of

@@ -32,9 +32,9 @@ from emaviz.figures import discovery
 from emaviz.figures.discovery import equation
 from emaviz.page.discover import WORKSPACE
 from emaviz.page.discover.candidate import CONFIG, EffectView
-from emaviz.page.docked import COLUMNS, NEXT_COLUMN
 from emaviz.page.panel import Cleared
 from emaviz.page.playback import PlaybackStrip
+from emaviz.page.window_layout import COLUMNS, NEXT_COLUMN
 from emaviz.page.workspaces import Page
 from emaviz.scene.playback import motion
 from emaviz.session.discover import source

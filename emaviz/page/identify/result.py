@@ -16,11 +16,11 @@ from ema_model.identification.uncertainty import Suggestion
 from ema_model.identification.words import CORRECTED, way_sentences
 from emaviz.figures import identification
 from emaviz.figures.identification import LiveConvergence, LiveFit, Row, colour, fault_bars, table
-from emaviz.page.docked import COLUMNS, NEXT_COLUMN
 from emaviz.page.identify import WORKSPACE
 from emaviz.page.panel import JobLine
 from emaviz.page.playback import PlaybackStrip
 from emaviz.page.tab import Standing
+from emaviz.page.window_layout import COLUMNS, NEXT_COLUMN
 from emaviz.page.workspaces import Page
 from emaviz.scene.playback import PLAYED, motion
 from emaviz.session.identify import Frame, Landscapes, Race, Track, ends

@@ -4,7 +4,7 @@
     recording = em.simulate("chirp", faults={"k1": 0.25}, noise_A=0.1)
     print(em.identify(recording))
 
-`face` says what each takes; what is below stands in the folders.  Nothing is loaded before it is asked for.
+`api` says what each takes; what is below stands in the folders.  Nothing is loaded before it is asked for.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from ema_model.face import (
+    from ema_model.api import (
         InputError,
         compare,
         compare_units,
@@ -43,9 +43,9 @@ __all__ = [
 
 def __getattr__(name: str) -> Any:
     if name in __all__:
-        from ema_model import face
+        from ema_model import api
 
-        return getattr(face, name)
+        return getattr(api, name)
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
 
 

@@ -29,7 +29,7 @@ FLOORS = {
         ["simulated_fleets"],
         ["practice"],
         ["campaign"],
-        ["face"],
+        ["api"],
     ],
     "ema_model.discovery": [
         ["criteria"],

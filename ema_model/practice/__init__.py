@@ -3,6 +3,6 @@
 `kinds` holds a file for each kind.  Whoever wants to solve a challenge calls `make` only; `reveal` tells the answer.
 """
 
-from ema_model.practice.made import challenge_in, make, reveal, shipped
+from ema_model.practice.make_and_reveal import challenge_in, make, reveal, shipped
 
 __all__ = ["challenge_in", "make", "reveal", "shipped"]

@@ -13,8 +13,8 @@ from numpy.typing import ArrayLike
 
 from ema_model.errors import InputError
 from ema_model.quantities.numbers import HALF_90
+from ema_model.tracking.json_form import as_dict
 from ema_model.tracking.result import Tracked
-from ema_model.tracking.summary import as_dict
 from emaviz.recording import writer as drawn_as
 from emaviz.recording.blueprint import plot
 from emaviz.recording.entry import RecordingError

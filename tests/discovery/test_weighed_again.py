@@ -11,7 +11,7 @@ from ema_model.discovery import as_dict, begun, result_of
 from ema_model.discovery.result import Change
 from ema_model.discovery.steps.weighed_again import near, weigh_again
 from ema_model.discovery.words import rung_label, rung_title
-from emaviz.session.discover.stories import steps_of, take_again
+from emaviz.session.discover.history import steps_of, take_again
 
 COMMANDS = [("chirp", {}, 0.5), ("sine", {"amplitude_rad": 0.03, "frequency_Hz": 3.0}, 1.0)]
 HIDDEN = {"stribeck_friction": {"speed_rad_s": 10.0}, "screw_lead_error": {"amplitude_rad": 1e-5}}

@@ -11,7 +11,7 @@ from support.flights import flights
 from ema_model.errors import InputError
 from ema_model.simulated_lives import drawn, healthy_life, worn_life
 from ema_model.tracking.flights import Flight
-from ema_model.tracking.summary import as_dict
+from ema_model.tracking.json_form import as_dict
 from ema_model.tracking.track import Tracker, track
 
 

@@ -53,7 +53,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def documents() -> tuple[type, ...]:
     """What --json holds."""
-    from ema_model.tracking.summary import TrackedJson
+    from ema_model.tracking.json_form import TrackedJson
 
     return (TrackedJson,)
 
@@ -121,7 +121,7 @@ def _tell(
     of: int | None = None,
 ) -> None:
     """Writes and prints what flights say; of: as many as there would have been without an interrupt."""
-    from ema_model.tracking.summary import as_dict
+    from ema_model.tracking.json_form import as_dict
     from ema_model.tracking.track import track
     from emaviz.cli import flow
 

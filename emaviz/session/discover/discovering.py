@@ -27,8 +27,8 @@ from ema_model.faults import NAMES
 from ema_model.quantities.titles import in_sentence
 from emaviz.session.compare import Comparing
 from emaviz.session.data_folder import DataFolder
+from emaviz.session.discover.history import Entries, Entry, SavedStories, Shown, Telling, undecided
 from emaviz.session.discover.source import NOTHING, DiscoverySource, Sealing
-from emaviz.session.discover.stories import Entries, Entry, SavedStories, Shown, Telling, undecided
 from emaviz.session.explore import Session
 from emaviz.session.inputs import Provenance
 from emaviz.session.jobs import Job, Signal, Tell, Worker

@@ -118,7 +118,7 @@ def test_numbers_of_numpy_and_paths_are_taken(recording):
 
 def test_flights_are_tracked_from_a_folder_or_in_order(tmp_path, monkeypatch):
     known = flights(0.1 + 0.04 * np.arange(9))
-    monkeypatch.setattr("ema_model.face.identified", known_flights.known(known, asked := []))
+    monkeypatch.setattr("ema_model.api.identified", known_flights.known(known, asked := []))
     known_flights.write_flights(tmp_path / "unit", len(known))
     told = []
     of_folder = em.track(tmp_path / "unit", thresholds={"k1": 0.6}, on_progress=told.append)

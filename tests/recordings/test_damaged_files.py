@@ -25,7 +25,7 @@ ENDINGS = {name: ending.removeprefix(".") for name, (ending, _) in FILES.items()
     "session": "emaviz",
     "listed rrd": "rrd",
 }
-BY_A_PROGRAM = "rrd", "listed rrd", "rerun"  # each is looked at by a program of its own first
+BY_A_PROGRAM = "rrd", "listed rrd"  # each is looked at by a program of its own first
 
 
 @pytest.fixture(scope="module")
@@ -75,7 +75,7 @@ def test_damaged_recordings(process, reader, tmp_path):
     assert not bad
 
 
-@pytest.mark.parametrize("reader", first_of(BY_A_PROGRAM))
+@pytest.mark.parametrize("reader", [*first_of(BY_A_PROGRAM), "rerun"])
 def test_a_name_with_a_nul_ends_no_process(process, reader, tmp_path):
     """Rerun's program finds no fault with it, and its native reader aborts."""
     [whole_one] = whole("rrd", tmp_path)

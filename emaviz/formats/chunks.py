@@ -9,7 +9,6 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.compute
 
-from ema_model.files.opened import ARRAYS
 from ema_model.recordings.formats.channels import Channel, Log, NoLog
 from ema_model.recordings.formats.json import decoded, numbers_of_records
 
@@ -45,8 +44,6 @@ class Chunks:
                 continue
             for name, values in columns.items():
                 if ":" in name and not name.startswith(_LEFT_OUT) and pa.types.is_list(values.type):
-                    if len(self._parts) > ARRAYS:
-                        raise NoLog(f"it holds over {ARRAYS} entities")
                     self._parts.setdefault((entity, name, timeline), []).append((columns[timeline], values))
 
     def has(self, root: str) -> bool:

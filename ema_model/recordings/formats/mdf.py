@@ -8,8 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from ema_model.files.opened import ARRAYS
-from ema_model.recordings.formats.channels import Channel, Log, NoLog, broken_file
+from ema_model.recordings.formats.channels import Channel, Log, broken_file
 from ema_model.recordings.formats.logs import log_format
 
 _MASTERS = (2, 3)  # kinds of channels that are their group's time
@@ -20,30 +19,25 @@ def opened(path: str, most_bytes: int) -> Iterator[Log]:
     """The file's channels, by the physical values that its conversions say; NoLog for what cannot be opened."""
     from asammdf import MDF
 
+    del most_bytes  # samples are counted before they are read
     with broken_file():
         # Descriptions of buses may stand in other files, which would be read for what is of no use here.
         file = MDF(path, process_bus_logging=False)  # type: ignore  its versions take it
     with file:
         with broken_file():
-            log = _log(file, most_bytes)
+            log = _log(file)
         yield log
 
 
-def _log(file: Any, most_bytes: int) -> Log:
+def _log(file: Any) -> Log:
     channels: list[Channel] = []
     clocks: dict[str, Any] = {}
-    seen = 0
     for number, group in enumerate(file.groups):
         samples = int(group.channel_group.cycles_nr)
         clock = f"group {number + 1}"
-        if 8 * samples > most_bytes:
-            raise NoLog(f"{clock} has more samples than a measurement may")
         name_of_group = str(getattr(group.channel_group, "acq_name", "") or "") or clock
         master = file.masters_db.get(number)
         for index, channel in enumerate(group.channels):
-            seen += 1
-            if seen > ARRAYS:
-                raise NoLog(f"it holds over {ARRAYS} channels")
             if index == master or samples < 2 or int(channel.channel_type) in _MASTERS:
                 continue
             unit = str(channel.unit or getattr(channel.conversion, "unit", "") or "")

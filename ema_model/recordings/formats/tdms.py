@@ -8,8 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from ema_model.files.opened import ARRAYS
-from ema_model.recordings.formats.channels import Array, Channel, Log, NoLog, broken_file
+from ema_model.recordings.formats.channels import Array, Channel, Log, broken_file
 from ema_model.recordings.formats.logs import log_format
 
 _INCREMENT, _START, _BEGINS = "wf_increment", "wf_start_offset", "wf_start_time"
@@ -38,8 +37,6 @@ def _log(file: Any) -> Log:
     aside = []
     for group in file.groups():
         for channel in group.channels():
-            if len(channels) + len(aside) > ARRAYS:
-                raise NoLog(f"it holds over {ARRAYS} channels")
             kind = np.dtype(channel.dtype).kind if channel.dtype is not None else "O"
             path, samples = (group.name, channel.name), len(channel)
             if kind == "M" and samples > 1:  # LabVIEW's time stamps

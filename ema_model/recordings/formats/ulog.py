@@ -6,8 +6,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any
 
-from ema_model.files.opened import ARRAYS
-from ema_model.recordings.formats.channels import Channel, Log, NoLog, broken_file
+from ema_model.recordings.formats.channels import Channel, Log, broken_file
 from ema_model.recordings.formats.logs import log_format
 
 _STAMP = "timestamp"
@@ -37,8 +36,6 @@ def _log(file: Any) -> Log:
         for name, values in topic.data.items():
             if name == _STAMP or values.dtype.kind not in "fiub":
                 continue
-            if len(channels) >= ARRAYS:
-                raise NoLog(f"it holds over {ARRAYS} fields")
             plain = name.replace("[", ".").replace("]", "")  # brackets are for units
             holds = values.dtype.kind in "iub"
             channels.append(Channel((clock, plain), len(values), lambda v=values: v, clock=clock, holds=holds))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from support.studied import studied
 
 from ema_model import faults
 from ema_model.actuator import load_actuator
@@ -88,3 +89,21 @@ def test_a_recorded_flight_is_told_as_drawn_ones_are():
         assert np.linalg.norm(given.common[0]) > np.sqrt(given.own[0, 0]), "the unit's part is the larger"
     total = np.sqrt(np.diag(sure.covariance))
     assert abs(sure.unbounded[0] - life.k[number, 0]) < 4.0 * total[0]
+
+
+# --- the study of lives, assets/plans/lives.toml: no false trends, and intervals that hold the life that remains ------
+
+
+@pytest.mark.study
+@pytest.mark.parametrize("law", LAWS)
+def test_intervals_hold_the_remaining_life(law):
+    rows = studied("lives")[law]
+    held = [low <= true <= high for row in rows for true, low, high in zip(row["true"], row["p05"], row["p95"])]
+    assert len(held) > 4 * len(rows), "most lives are told before they end"
+    assert 0.85 <= np.mean(held) <= 0.95
+
+
+@pytest.mark.study
+def test_a_healthy_life_has_no_trend():
+    rows = studied("lives")["healthy"]
+    assert sum(bool(row["trends"]) for row in rows) <= max(1, 0.01 * len(rows))

@@ -9,8 +9,8 @@ from support.flights import flights
 from ema_model import faults
 from ema_model.estimation.problem import to_vector
 from ema_model.simulated_lives import drawn, worn_life
-from ema_model.simulated_lives.life import base_of
-from ema_model.tracking.series import Unit
+from ema_model.simulated_lives.life import WORN_AT, accuracy, base_of
+from ema_model.tracking.series import Unit, growth
 from ema_model.tracking.track import Tracker, track
 
 HEALTHY = to_vector(faults.HEALTHY)
@@ -129,3 +129,21 @@ def test_intervals_hold_lives_of_a_few_seeds():
                 left = tracker.look().faults[life.fault].remaining
                 held += [left.p05 <= last - i <= left.p95] if left else []
     assert len(held) > 40 and 0.75 <= np.mean(held)
+
+
+# --- by what a sensitivity to the base parameters grows with the k that it belongs to ---------------------------------
+
+
+def test_it_grows_as_identifications_of_worn_actuators_have_it():
+    """Backlash, of all profiles: identified with the fault, over identified without."""
+    k = np.zeros((2, 8))
+    k[1, 1] = WORN_AT
+    healthy, worn = growth(k)[:, 1]
+    found = np.linalg.norm(accuracy().common[[0, 2], :, 1], axis=2)
+    assert worn > 20.0 * healthy
+    np.testing.assert_allclose(found[1] / found[0], worn / healthy, rtol=0.1)
+
+
+def test_noise_beyond_the_range_counts_as_its_end():
+    np.testing.assert_array_equal(growth(np.full(8, -0.5)), growth(np.zeros(8)))
+    np.testing.assert_array_equal(growth(np.full(8, 1.5)), growth(np.ones(8)))

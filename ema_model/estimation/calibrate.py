@@ -24,7 +24,7 @@ from ema_model.estimation.problem import (
     starts_of,
     unknowns_of,
 )
-from ema_model.faults import NAMES, named
+from ema_model.faults import FACTORS, NAMES, named
 from ema_model.models import Model
 from ema_model.models.model import Signals
 from ema_model.quantities.axes import Axes
@@ -170,9 +170,9 @@ def _floors_left(
 
 
 def convergence(fit: Calibration) -> str:
-    """'It has converged; χ² per value 1.02 (1 is the floor), 87 evaluations.'"""
-    how = "It has converged" if fit.converged else "It has not converged: its values are not to be trusted"
-    return f"{how}; χ² per value {number(fit.chi2_per_value)} (1 is the floor), {fit.evaluations} evaluations."
+    """'It has converged after 87 evaluations.'"""
+    how = "It has converged" if fit.converged else "It has not converged: its values are not to be trusted,"
+    return f"{how} after {fit.evaluations} evaluations."
 
 
 def calibration_table(fit: Calibration, axes: Axes, among: Collection[str] | None = None) -> Table | None:
@@ -215,20 +215,23 @@ def together(fit: Calibration, axes: Axes) -> list[str]:
     """'Known only together, if the model is right: gain · torque constant / resistance = 0.0230 ± 0.0021. …'"""
     if not fit.identifiable:
         return []
-    found = []
-    for one in fit.identifiable:
-        low, high = one.interval90
-        found.append(f"{product_in_words(one, axes)} = {with_uncertainty(one.value, 0.5 * (high - low), '')}")
+    found = [combination_in_words(one, axes) for one in fit.identifiable]
     silent = "current_A" not in {name for part in fit.weighted_sensitivities for name in part}
     how = "Record the current as well, or measure one of them apart" if silent else "Measure one of them apart"
     return [f"Known only together, if the model is right: {'; '.join(found)}. {how}."]
 
 
+def combination_in_words(one: Combination, axes: Axes) -> str:
+    """'gain · torque constant / resistance = 0.0230 ± 0.0021'"""
+    low, high = one.interval90
+    return f"{product_in_words(one, axes)} = {with_uncertainty(one.value, 0.5 * (high - low), '')}"
+
+
 def product_in_words(one: Combination, axes: Axes) -> str:
-    """'gain · torque constant / resistance²'"""
+    """'gain · torque constant / resistance²'; a fault by its factor, '(1 − k3)'."""
     above, below = (
         [
-            f"{in_sentence(_title(name, axes))}{'²' if abs(power) == 2 else ''}"
+            f"{FACTORS.get(name) or in_sentence(_title(name, axes))}{'²' if abs(power) == 2 else ''}"
             for name, power in one.powers.items()
             if (power > 0) is over
         ]

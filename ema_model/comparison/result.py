@@ -142,11 +142,12 @@ _MOST_TOLD = 6  # held-out recordings, each in a line of its own
 
 
 def held_out(one: Compared) -> str:
-    """'chirp was not fitted; the calibrated model is off by: equivalent current 0.42 A (1.30 times its floor), …'."""
+    """'chirp was not fitted; the calibrated model is off by: current 0.42 A (floor 0.31 A: 1.35 times it), …'."""
     told = []
     for name, error in one.errors.items():
         shown = error.quantity(of_signal(name, ROTARY))  # by the name in files, which says all
-        floor = f" ({error.in_floors.text} times its floor)" if _has_floor(name, error) else ""
+        known = f"floor {shown.text(error.noise_floor)}: {error.in_floors.text} times it"
+        floor = f" ({known})" if _has_floor(name, error) else ""
         told.append(f"{in_sentence(shown.title)} {shown.text(error.rmse)}{floor}")
     return f"{one.name or 'the recording'} was not fitted; the calibrated model is off by: {', '.join(told)}"
 
@@ -161,6 +162,8 @@ def of_floor(result: Comparison) -> str:
 
     With each signal's in its unit, those that are above their own band alone, and that of what was held out.
     """
+    if result.uninformative:  # whatever the model
+        return f"All signals together, the error is {result.in_floors.text} times the floor."
     axes = result.actuator.axes
     counted = {name: one for name, one in result.signals.items() if one.is_counted}
     units = ", ".join(one.in_words(of_signal(name, axes)) for name, one in counted.items())

@@ -82,9 +82,9 @@ def judge(
     if adequate:
         sentences.append(_explained(of_signal(primary, actuator.axes), errors[shown], told))
     else:
-        sentences.append(_off(of_signal(primary, actuator.axes), errors[shown]))
-        if not told.is_above and (why := _yet_missing(significant, slow, calibration, actuator)):
-            sentences.append(f"Its size is that of noise, but {why}.")
+        why = "" if told.is_above else _yet_missing(significant, slow, calibration, actuator)
+        but = f" Its size is that of noise, but {why}." if why else ""
+        sentences.append(_off(of_signal(primary, actuator.axes), errors[shown]) + but)
     return Judgement(
         residuals=residuals,
         primary=shown,

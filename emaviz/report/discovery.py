@@ -154,7 +154,7 @@ def _parameters(told: Told, one: Added) -> str:
     known = {parameter.name: parameter for parameter in find(one.name, told.found.actuator.axes).parameters}
     rows = []
     for name, setting in one.chosen.items():
-        rows.append([known[name].meaning, known[name].shown, f"{setting:g} {known[name].unit} (chosen)"])
+        rows.append([known[name].meaning, known[name].shown, f"{setting:g} {known[name].unit}".strip() + " (chosen)"])
     for name in one.parameters:
         fitted = fitted_of(told.found, one, name)
         rows.append([known[name].meaning, known[name].shown, value(fitted)])

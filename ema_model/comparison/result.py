@@ -20,8 +20,9 @@ from ema_model.comparison.residuals import Residuals, dependence
 from ema_model.estimation.calibrate import (
     Calibrated,
     Calibration,
+    CombinationJson,
     calibration_table,
-    product_in_words,
+    combinations,
     together,
 )
 from ema_model.quantities.axes import ROTARY, SIGNALS, Axes, of_residual, of_signal
@@ -38,7 +39,6 @@ if TYPE_CHECKING:
     from ema_model.comparison.free_simulation import Simulated
     from ema_model.comparison.regions import Event
     from ema_model.estimation.calibrate import Calibration
-    from ema_model.estimation.information import Combination
     from ema_model.recordings import Measurement
     from ema_model.recordings.health import Health
 
@@ -386,15 +386,6 @@ class ParameterJson(TypedDict):
     at_bound: Annotated[bool, Meta(description="whether the fit ended at the end of what is allowed")]
 
 
-class CombinationJson(TypedDict):
-    """Parameters that are known only together, as the product of their powers."""
-
-    members: Annotated[dict[str, int], Meta(description="powers by the names in the actuator's file")]
-    combination: Annotated[str, Meta(description="the product in words")]
-    value: Annotated[float, Meta(description="of the product, in SI units")]
-    interval90: Annotated[IntervalJson, Meta(description="the ends of the 90 % interval about value")]
-
-
 class CalibrationJson(TypedDict):
     """The fit of the actuator's parameters within their tolerances."""
 
@@ -642,19 +633,6 @@ def calibration_dict(calibration: Calibration, axes: Axes) -> CalibrationJson:
         "outside_tolerance": [on_axes(name, axes).path for name in calibration.outside_tolerance],
         "confounded": [[on_axes(a, axes).path, on_axes(b, axes).path] for a, b in calibration.confounded],
     }
-
-
-def combinations(known: Sequence[Combination], axes: Axes) -> list[CombinationJson]:
-    """What is known only together, by the names in files."""
-    return [
-        {
-            "members": {on_axes(name, axes).path: power for name, power in one.powers.items()},
-            "combination": product_in_words(one, axes),
-            "value": one.value,
-            "interval90": list(one.interval90),
-        }
-        for one in known
-    ]
 
 
 def parameter_dict(one: Calibrated) -> ParameterJson:

@@ -20,12 +20,10 @@ from ema_model.comparison.loop_lag import BLAMED, LoopLag
 from ema_model.comparison.residuals import dependence
 from ema_model.comparison.result import (
     CalibrationJson,
-    CombinationJson,
     EventJson,
     ParameterJson,
     SimulatedJson,
     calibration_dict,
-    combinations,
     event_dict,
     free_simulation,
     parameter_dict,
@@ -41,7 +39,7 @@ from ema_model.effects import CATALOGUE, find
 from ema_model.effects.effect import FAMILIES
 from ema_model.errors import InputError
 from ema_model.estimation import Calibrated
-from ema_model.estimation.calibrate import together
+from ema_model.estimation.calibrate import CombinationJson, combinations, together
 from ema_model.faults import BY_NAME, FAULTS, NAMES, cause_of, causes, vector
 from ema_model.quantities.axes import Axes, of_signal
 from ema_model.quantities.numbers import IntervalJson, Quantity, amount, number, with_uncertainty

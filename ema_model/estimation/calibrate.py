@@ -5,8 +5,10 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import Annotated, TypedDict
 
 import numpy as np
+from msgspec import Meta
 from numpy.typing import ArrayLike, NDArray
 
 from ema_model.actuator import Actuator
@@ -28,7 +30,7 @@ from ema_model.faults import FACTORS, NAMES, named
 from ema_model.models import Model
 from ema_model.models.model import Signals
 from ema_model.quantities.axes import Axes
-from ema_model.quantities.numbers import HALF_90, number, with_uncertainty
+from ema_model.quantities.numbers import HALF_90, IntervalJson, number, with_uncertainty
 from ema_model.quantities.titles import in_sentence
 from ema_model.side_by_side import windows
 from ema_model.text import Severity, Table
@@ -239,6 +241,28 @@ def product_in_words(one: Combination, axes: Axes) -> str:
     )
     divided = f" / {below[0]}" if len(below) == 1 else f" / ({' · '.join(below)})" if below else ""
     return f"{' · '.join(above)}{divided}"
+
+
+class CombinationJson(TypedDict):
+    """Parameters that are known only together, as the product of their powers."""
+
+    members: Annotated[dict[str, int], Meta(description="powers by the names in the actuator's file")]
+    combination: Annotated[str, Meta(description="the product in words")]
+    value: Annotated[float, Meta(description="of the product, in SI units")]
+    interval90: Annotated[IntervalJson, Meta(description="the ends of the 90 % interval about value")]
+
+
+def combinations(known: Sequence[Combination], axes: Axes) -> list[CombinationJson]:
+    """What is known only together, by the names in files."""
+    return [
+        {
+            "members": {on_axes(name, axes).path: power for name, power in one.powers.items()},
+            "combination": product_in_words(one, axes),
+            "value": one.value,
+            "interval90": list(one.interval90),
+        }
+        for one in known
+    ]
 
 
 def _title(path: str, axes: Axes) -> str:

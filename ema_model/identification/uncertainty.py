@@ -102,7 +102,7 @@ def _sizes(found: Fitted) -> dict[str, tuple[float, float]]:
 
 def _in_unit(found: Fitted, signal: str) -> float:
     """rms of what is left of a signal, in its unit, the model's known bias added."""
-    parts = [
+    parts: list[Floating] = [
         found.residual[rows] / found.problem.over_sigma(window, name, np.ones(rows.stop - rows.start))
         for window, name, rows in found.problem.parts()
         if name == signal

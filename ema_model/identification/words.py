@@ -13,8 +13,7 @@ from ema_model import faults
 from ema_model.actuator import Actuator
 from ema_model.actuator.actuator import between, readings, sentences
 from ema_model.actuator.parameters import on_axes
-from ema_model.comparison.result import CombinationJson, combinations
-from ema_model.estimation.calibrate import combination_in_words
+from ema_model.estimation.calibrate import CombinationJson, combination_in_words, combinations
 from ema_model.identification.run import Identification, Progress, algorithm_title
 from ema_model.identification.search import Landscape, Way
 from ema_model.quantities.numbers import IntervalJson, amount

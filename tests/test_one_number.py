@@ -35,6 +35,7 @@ from ema_model.comparison.result import (
 )
 from ema_model.comparison.result import as_dict as compared_as_dict
 from ema_model.discovery import Discovery, discover, result_of, words
+from ema_model.discovery.result import Change, errors_of
 from ema_model.discovery.steps.begin import begun
 from ema_model.discovery.steps.snapshot import Look, assessed, look_at
 from ema_model.estimation.calibrate import calibration_table, combination_in_words
@@ -313,6 +314,17 @@ def test_an_effects_errors_are_those_of_the_ladder():
     [one], (before, after) = document["effects"], document["ladder"][-2:]
     assert (one["rmse_before"], one["rmse_after"]) == (before["rmse"], after["rmse"])
     assert (one["holdout_rmse_before"], one["holdout_rmse_after"]) == (before["holdout_rmse"], after["holdout_rmse"])
+
+
+def test_an_effect_in_anothers_place_is_told_from_the_step_before_both():
+    found = discovered("found")
+    [one], base = found.effects, found.ladder[0]
+    changes = [Change(), Change("effect", ("stribeck_friction",)), Change("replaced", ("stribeck_friction", one.name))]
+    steps = [
+        replace(base, change=change, rmse=rmse, holdout_rmse=None) for change, rmse in zip(changes, (9.0, 4.0, 2.0))
+    ]
+    told = errors_of(steps, replace(one, rmse_before=9.1, rmse_after=2.1))
+    assert (told["rmse_before"], told["rmse_after"], told["holdout_before"]) == (9.0, 2.0, None)
 
 
 @pytest.mark.parametrize("case", DISCOVERED)

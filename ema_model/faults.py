@@ -44,6 +44,10 @@ NAMES = tuple(fault.name for fault in FAULTS)
 BY_NAME = {fault.name: fault for fault in FAULTS}
 # What is one cause: of the eccentricity its modulus and its phase.
 CAUSES = (("k1",), ("k2",), ("k3",), ("k4",), ("k5",), ("k6", "k7"), ("k8",))
+# What each multiplies in the actuator, in words: see `physical`.  An eccentricity is no factor.
+FACTORS = {"k1": "(1 + 2 k1)", "k2": "(1 + 99 k2)", "k8": "(0.5 + k8)"} | {
+    name: f"(1 − {name})" for name in ("k3", "k4", "k5")
+}
 HEALTHY: NDArray[np.float64] = np.array([fault.healthy for fault in FAULTS])
 HEALTHY.setflags(write=False)
 
@@ -80,6 +84,14 @@ def physical(k: ArrayLike) -> PhysicalFaults:
         phase_rad=2.0 * np.pi * (k[..., 6] - 0.5),
         gain_factor=0.5 + k[..., 7],
     )
+
+
+def factors(k: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """What each of one k (8,) multiplies, and its derivative by k, (8,) each; NaN of the eccentricity."""
+    read = physical(k)
+    values = [read.friction_factor, read.backlash_factor, *read.turns, np.nan, np.nan, read.gain_factor]
+    slopes = [2.0, 99.0, -1.0, -1.0, -1.0, np.nan, np.nan, 1.0]
+    return np.array(values, dtype=float), np.array(slopes)
 
 
 def vector(settings: dict[str, float]) -> NDArray[np.float64]:

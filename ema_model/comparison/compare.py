@@ -13,6 +13,7 @@ from ema_model.actuator.file import check_represents
 from ema_model.actuator.parameters import path_inside
 from ema_model.comparison.free_simulation import Simulated, in_open_loop, is_by_motion, scored
 from ema_model.comparison.loop_lag import other_controller
+from ema_model.comparison.over_floor import UNKNOWN, OverFloor, by_signal, is_counted
 from ema_model.comparison.residuals import residuals_of
 from ema_model.comparison.result import Compared, Comparison, SignalError
 from ema_model.comparison.verdict import judge, judged, silence
@@ -113,23 +114,27 @@ def _compare(
     plant, floors, before, after = _everywhere(recordings, fitted, floors, calibration, actuator)
     own = twins if plant is fitted else [{} for _ in plant.windows]
     residuals = residuals_of(plant, floors, after, own, calibration.actuator, calibration if plant is fitted else None)
+    told = residuals, plant.windows, floors
     compared = [
-        _compared(i, recordings[i], cards[i], plant, floors, before, after, actuator) for i in range(len(recordings))
+        _compared(i, recordings[i], cards[i], plant, floors, before, after, actuator, by_signal(*told, i))
+        for i in range(len(recordings))
     ]
-    errors = _together(compared)
+    errors = _together(compared, {actuator.axes.signal(name): one for name, one in by_signal(*told).items()})
     fitted_to = calibration.as_result if calibrate else None
     pooled = [judged(window.measured.keys() & one.keys()) for window, one in zip(plant.windows, after)]
     known_to = spread(floors, pooled)
-    judgement = judge(residuals, errors, fitted_to, actuator, [one.name for one in recordings], known_to)
+    floor_band = band(known_to, least(floors, pooled))
+    names = [one.name for one in recordings]
+    judgement = judge(residuals, errors, fitted_to, actuator, names, known_to, floor_band)
     lag = other_controller(plant, fitted_to, before, judgement.over_floor)
     unsaid = [sentence for one in compared if (sentence := silence(one, actuator)) and not judgement.uninformative]
     held: Sequence[Compared] = ()
+    held_floors: OverFloor | None = None
     if unseen:
         tell("holding it against what was not fitted")
         known = calibration, taken
-        held = _compare(
-            unseen, calibration.actuator, calibration.k, None, False, None, signals, (), tell, known
-        ).recordings
+        other = _compare(unseen, calibration.actuator, calibration.k, None, False, None, signals, (), tell, known)
+        held, held_floors = other.recordings, other.in_floors
     simulation: Mapping[str, Simulated] = {}
     if elsewhere is None:
         tell("simulating it freely")
@@ -148,10 +153,11 @@ def _compare(
         adequate=judgement.adequate,
         uninformative=judgement.uninformative,
         over_floor=judgement.over_floor,
-        floor_band=band(known_to, least(floors, pooled)),
+        floor_band=floor_band,
         sentences=[*([] if lag is None else [lag.blamed(fitted_to, judgement.over_floor)]), *judgement.sentences],
         warnings=[*judgement.warnings, *unsaid],
         holdout=held,
+        unseen=held_floors,
         simulation=simulation,
     )
 
@@ -284,7 +290,9 @@ def _compared(
     before: Sequence[dict[str, Array]],
     after: Sequence[dict[str, Array]],
     actuator: Actuator,
+    over: Mapping[str, OverFloor],
 ) -> Compared:
+    """over: the error in floors, by the signals' names inside."""
     chosen = [i for i, window in enumerate(plant.windows) if window.recording == index]
     windows = [plant.windows[i] for i in chosen]
     names = [name for name in windows[0].measured if name in after[chosen[0]]]
@@ -303,7 +311,9 @@ def _compared(
         error = signal_error(measured[name], initial[name], model[name], sigma[name])
         about = float(np.mean(measured[name])) if SIGNAL_KINDS[name].kind == "position" else 0.0
         size = float(np.sqrt(np.mean((measured[name] - about) ** 2)))
-        errors[name] = replace(error, signal_rms=size, silent=silent)
+        counted = is_counted(name, names)
+        told = over.get(name, UNKNOWN)
+        errors[name] = replace(error, signal_rms=size, silent=silent, in_floors=told, is_counted=counted)
     shown = actuator.axes.outside
     return Compared(
         name=measurement.name,
@@ -332,7 +342,8 @@ def signal_error(measured: Array, initial: Array, model: Array, sigma: Array) ->
     )
 
 
-def _together(compared: Sequence[Compared]) -> dict[str, SignalError]:
+def _together(compared: Sequence[Compared], over: Mapping[str, OverFloor]) -> dict[str, SignalError]:
+    """Of all recordings; over: the error in floors, by the signals' names."""
     found = {}
     for name in dict.fromkeys(name for one in compared for name in one.errors):
         having = [one for one in compared if name in one.errors]
@@ -345,5 +356,7 @@ def _together(compared: Sequence[Compared]) -> dict[str, SignalError]:
             error,
             signal_rms=float(np.sqrt(np.average(np.square(sizes), weights=weights))),
             silent=silent[0] if all(silent) else "",
+            in_floors=over.get(name, UNKNOWN),
+            is_counted=all(one.errors[name].is_counted for one in having),
         )
     return found

@@ -400,6 +400,11 @@ class Explanation:
     sentence: str  # "The residual current repeats with the motor's angle."
     beyond_noise: float = 0.0  # the share of the power beyond noise and floor alone, −1 … 1
 
+    @property
+    def share(self) -> float:
+        """Of the residual's power as it is, 0 … 1, as all that show it say it; what tells nothing ahead has none."""
+        return min(1.0, max(0.0, self.r2))
+
 
 @dataclass(frozen=True, eq=False)
 class _Candidate:
@@ -480,7 +485,7 @@ def explain(residuals: Residuals, signal: str, axes: Axes) -> list[Explanation]:
                 centres=centres,
                 curve=curve,
                 error=error,
-                sentence=explanation_sentence(axes.signal(signal), one.variable, one.modulator, r2),
+                sentence=explanation_sentence(axes.signal(signal), one.variable, one.modulator, max(0.0, r2)),
                 beyond_noise=float(np.clip(one.gain / beyond, -1.0, 1.0)),
             )
         )

@@ -21,6 +21,7 @@ from ema_model.comparison.criteria import (
     EVENT_T,
 )
 from ema_model.comparison.explain import Explanation, modulator_of, quantile_knots, used_blocks, without_spikes
+from ema_model.comparison.over_floor import ratio
 from ema_model.comparison.residuals import Residuals, event_sentence, range_text, region_sentence
 from ema_model.quantities.axes import Axes
 from ema_model.recordings import SIGNALS
@@ -50,7 +51,7 @@ class Region:
     high: float
     rmse: float  # in the signal's unit
     mean: float  # of the residual, likewise
-    excess: float  # rmse over the floor there
+    excess: float  # rms of the error over the floor there
     sentence: str  # "The motor needs 35.2 mN·m more torque at 300 rad/s than the model."
     blocks: NDArray[np.bool_]  # (blocks,) of the joined residuals
 
@@ -167,7 +168,7 @@ def _region(
         high=high,
         rmse=rmse,
         mean=mean,
-        excess=rmse / float(np.sqrt(np.mean(residuals.sigma[signal][mask] ** 2))),
+        excess=ratio(residuals, [signal], mask),
         sentence=region_sentence(
             axes.signal(signal),
             variable,

@@ -273,7 +273,7 @@ def dependence(variable: str, modulator: str) -> str:
 
 def explanation_sentence(signal: str, variable: str, modulator: str, r2: float) -> str:
     """One line on what explains a residual, and how much of it."""
-    share = f"{100.0 * max(0.0, r2):.0f} % of the residual {in_sentence(SIGNALS[signal].title)} variance"
+    share = f"{100.0 * r2:.0f} % of the residual {in_sentence(SIGNALS[signal].title)} variance"
     return f"{share} is explained by {dependence(variable, modulator)} (cross-validated)."
 
 

@@ -14,13 +14,15 @@ from numpy.typing import NDArray
 from ema_model.actuator.parameters import on_axes
 from ema_model.comparison.explain import Explanation
 from ema_model.comparison.free_simulation import Score, Simulated, without
+from ema_model.comparison.over_floor import UNKNOWN, OverFloor
 from ema_model.comparison.regions import Event, Region
 from ema_model.comparison.residuals import Residuals, dependence
 from ema_model.estimation.calibrate import (
     Calibrated,
     Calibration,
+    CombinationJson,
     calibration_table,
-    product_in_words,
+    combinations,
     together,
 )
 from ema_model.quantities.axes import ROTARY, SIGNALS, Axes, of_residual, of_signal
@@ -29,7 +31,7 @@ from ema_model.quantities.titles import all_of, in_sentence
 from ema_model.quantities.variables import of_variable
 from ema_model.recordings.health import HealthJson
 from ema_model.recordings.noise import least_noise
-from ema_model.text import Document, InWords, Lines, Note, Severity, Table
+from ema_model.text import Document, InWords, Lines, Note, Table
 
 if TYPE_CHECKING:
     from ema_model.actuator import Actuator
@@ -59,6 +61,12 @@ class SignalError:
     mean_absolute: float
     signal_rms: float = math.nan  # of what was measured; of a position about its mean
     silent: str = ""  # why the signal tells nothing of the model, as of `estimation.floor.tells_nothing`
+    in_floors: OverFloor = UNKNOWN  # the error over the floor of the same moment; no quotient of the numbers above
+    is_counted: bool = True  # whether it is one of those whose errors in floors are pooled
+
+    def in_words(self, signal: Quantity) -> str:
+        """'equivalent current 42.1 mA rms'."""
+        return f"{in_sentence(signal.title)} {self.quantity(signal).text(self.rmse)} rms"
 
     def quantity(self, signal: Quantity) -> Quantity:
         """The signal in the prefix that all numbers of its error are written with."""
@@ -100,6 +108,7 @@ class Comparison(InWords):
     warnings: Sequence[str] = field(default_factory=tuple)
     events: Sequence[Event] = field(default_factory=tuple)  # what happened at one moment of a recording
     holdout: Sequence[Compared] = field(default_factory=tuple)  # not fitted, beside the calibrated model
+    unseen: OverFloor | None = None  # the pooled error of what was held out; None without any
     uninformative: bool = False  # the recordings tell nothing of the model, so that it is not adequate either
     simulation: Mapping[str, Simulated] = field(default_factory=dict)  # of the model running freely, by signal
 
@@ -108,10 +117,21 @@ class Comparison(InWords):
         """One of `COMPARISON_VERDICTS`."""
         return "uninformative" if self.uninformative else "adequate" if self.adequate else "not_adequate"
 
+    @property
+    def in_floors(self) -> OverFloor:
+        """The pooled error of what was fitted, with its band."""
+        return OverFloor(self.over_floor, self.floor_band)
+
+    @property
+    def is_within_band(self) -> bool:
+        """Whether no error is above its band: that of all signals, of the explained one, of what was held out."""
+        told = [self.in_floors, self.signals[self.primary].in_floors, *([] if self.unseen is None else [self.unseen])]
+        return not any(one.is_above for one in told)
+
 
 # --- a comparison in words: its sentences, the errors, what explains them, the calibration ----------------------------
 
-_NEAR_FLOOR, _FAR_FROM_FLOOR = 1.2, 2.0  # error over floor, from which on one is looked at, and stands out
+_ELSEWHERE = 1.25  # times the quotient of rms error and rms floor, that an error over the floor must be from it
 FREE_NOTE = (
     "Free simulation: the model runs from the recordings' first state on, driven by the command alone, or in open loop "
     "by the recorded current, torque or force; nothing of the measured motion is fed back. Where the controller is not "
@@ -122,11 +142,12 @@ _MOST_TOLD = 6  # held-out recordings, each in a line of its own
 
 
 def held_out(one: Compared) -> str:
-    """'chirp was not fitted: the equivalent current is off by 0.42 A (floor 0.31 A), …'."""
+    """'chirp was not fitted; the calibrated model is off by: current 0.42 A (floor 0.31 A: 1.35 times it), …'."""
     told = []
     for name, error in one.errors.items():
         shown = error.quantity(of_signal(name, ROTARY))  # by the name in files, which says all
-        floor = f" (floor {shown.text(error.noise_floor)})" if _has_floor(name, error) else ""
+        known = f"floor {shown.text(error.noise_floor)}: {error.in_floors.text} times it"
+        floor = f" ({known})" if _has_floor(name, error) else ""
         told.append(f"{in_sentence(shown.title)} {shown.text(error.rmse)}{floor}")
     return f"{one.name or 'the recording'} was not fitted; the calibrated model is off by: {', '.join(told)}"
 
@@ -137,10 +158,26 @@ def verdict(result: Comparison) -> str:
 
 
 def of_floor(result: Comparison) -> str:
-    """'All signals together, the error is 1.02 times the floor; a true model's is 0.97 to 1.03 (90 % interval).'"""
-    low, high = result.floor_band
-    error = f"All signals together, the error is {number(result.over_floor)} times the floor"
-    return f"{error}; a true model's is {low:.2f} to {high:.2f} (90 % interval)."
+    """'All signals together, the error is 1.02 times the floor; a true model's is 0.97 to 1.03 (90 % interval). …'
+
+    With each signal's in its unit, those that are above their own band alone, and that of what was held out.
+    """
+    if result.uninformative:  # whatever the model
+        return f"All signals together, the error is {result.in_floors.text} times the floor."
+    axes = result.actuator.axes
+    counted = {name: one for name, one in result.signals.items() if one.is_counted}
+    units = ", ".join(one.in_words(of_signal(name, axes)) for name, one in counted.items())
+    told = [f"All signals together, the error is {result.in_floors.beside_band}."]
+    if len(counted) > 1:
+        told.append(f"That is {units}.")
+        told += [
+            f"The {in_sentence(of_signal(name, axes).title)} alone is off by {one.in_floors.beside_band}."
+            for name, one in counted.items()
+            if one.in_floors.is_above and not result.in_floors.is_above
+        ]
+    if result.unseen is not None:
+        told.append(f"On what was not fitted, the error is {result.unseen.beside_band}.")
+    return " ".join(told)
 
 
 def document_of(result: Comparison) -> Document:
@@ -180,14 +217,15 @@ def _error_table(title: str, result: Comparison, of: Sequence[tuple[str, str, Si
     rows, units, severities = [], [], []
     for name, signal, error, said in of:
         shown = error.quantity(of_signal(signal, result.actuator.axes))
-        floor = error.noise_floor if _has_floor(signal, error) else math.nan
-        over = error.rmse / floor
+        has_floor = _has_floor(signal, error)
+        floor = error.noise_floor if has_floor else math.nan
+        over = error.in_floors if has_floor else UNKNOWN
         before = [error.rmse_initial] if result.calibration is not None else []
         numbers = [number(shown.factor * one) for one in (*before, error.rmse, floor)]
         mean, share = number(shown.factor * error.mean_absolute), f"{number(100.0 * error.nrmse)} %"
-        rows.append([name, *numbers, mean, share, number(over)])
-        units.append(f"{shown.unit}{said}{', uninformative' if error.silent else ''}")
-        severities.append(_severity(over) if math.isfinite(over) and not error.silent else "note")
+        rows.append([name, *numbers, mean, share, over.text])
+        units.append(f"{shown.unit}{said}{_remark(error, floor)}")
+        severities.append(over.severity if error.is_counted and not error.silent else "note")
     head = ["before"] if result.calibration is not None else []
     head += ["rms error", "floor", "mean |e|", "of range", "error / floor"]
     return Table(head, rows, title, units, severities=severities)
@@ -229,12 +267,23 @@ def _score(score: Score, shown: Quantity) -> list[str]:
 
 
 def _has_floor(signal: str, error: SignalError) -> bool:
-    """Whether a recording tells the signal's noise; that of a speed which is 0 for most of the time does not."""
-    return error.noise_floor > _TOLD * least_noise(signal)
+    """Whether a recording tells the signal's noise; that of a speed which is 0 for most of the time does not.
+
+    What is pooled has the floor that it is counted in.
+    """
+    return error.is_counted or error.noise_floor > _TOLD * least_noise(signal)
 
 
-def _severity(over: float) -> Severity:
-    return "good" if over < _NEAR_FLOOR else "warning" if over < _FAR_FROM_FLOOR else "bad"
+def _remark(error: SignalError, floor: float) -> str:
+    """What is to be known of an error over the floor; floor: rms, in the signal's unit."""
+    if error.silent:
+        return ", uninformative"
+    if not error.is_counted:
+        return ", not counted"
+    share = error.in_floors.error * floor / error.rmse if error.rmse else math.nan
+    if share > _ELSEWHERE:
+        return ", most where its floor is low"
+    return ", most where its floor is high" if share < 1.0 / _ELSEWHERE else ""
 
 
 def details(result: Comparison, region: Region) -> str:
@@ -262,7 +311,7 @@ def _why(result: Comparison) -> Iterator[Table | Lines | Note]:
     if result.explained_by:
         rows, remarks = [], []
         for one in result.explained_by[:6]:
-            rows.append([dependence(one.variable, one.modulator), f"{100.0 * one.r2:.1f} %"])
+            rows.append([dependence(one.variable, one.modulator), f"{100.0 * one.share:.1f} %"])
             remarks.append("" if one.significant else "within noise")
         yield Table(
             ("cross-validated",), rows, "what explains the residual", remarks, "share of its variance; shares overlap"
@@ -293,6 +342,13 @@ class SignalErrorJson(TypedDict):
     ]
     rmse_initial: Annotated[float | None, Meta(description="rmse before the calibration, with the file's parameters")]
     mean_absolute: Annotated[float | None, Meta(description="mean of |measurement − model|")]
+    over_floor: Annotated[
+        float | None, Meta(description="rms of the error over the floor of the same moment; null: none is known")
+    ]
+    floor_band: Annotated[
+        list[float | None], Meta(description="between which over_floor of nine of ten true models lies")
+    ]
+    counted: Annotated[bool, Meta(description="whether the pooled over_floor counts it; a speed beside a position: no")]
     informative: Annotated[
         bool, Meta(description="false: the signal is constant, or no larger than its floor, and tells nothing")
     ]
@@ -328,15 +384,6 @@ class ParameterJson(TypedDict):
     unit: Annotated[str, Meta(description="of value, initial and interval90; empty for a ratio")]
     z: Annotated[float, Meta(description="value − initial, in σ of the file's tolerance")]
     at_bound: Annotated[bool, Meta(description="whether the fit ended at the end of what is allowed")]
-
-
-class CombinationJson(TypedDict):
-    """Parameters that are known only together, as the product of their powers."""
-
-    members: Annotated[dict[str, int], Meta(description="powers by the names in the actuator's file")]
-    combination: Annotated[str, Meta(description="the product in words")]
-    value: Annotated[float, Meta(description="of the product, in SI units")]
-    interval90: Annotated[IntervalJson, Meta(description="the ends of the 90 % interval about value")]
 
 
 class CalibrationJson(TypedDict):
@@ -395,6 +442,7 @@ class RegionJson(_Range):
     variable: Annotated[str, Meta(description="what the range is of: motor_speed, time, …")]
     rmse: Annotated[float | None, Meta(description="of the residual there, in the signal's unit")]
     mean: Annotated[float | None, Meta(description="of the residual there, measurement − model, in the signal's unit")]
+    over_floor: Annotated[float | None, Meta(description="rms of the error over the floor there")]
     sentence: Annotated[str, Meta(description="the same in words")]
 
 
@@ -433,6 +481,14 @@ class ComparisonJson(TypedDict):
         float | None, Meta(description="rms error pooled over signals, in units of the floor; 1 is the floor")
     ]
     floor_band: Annotated[list[float], Meta(description="between which over_floor of nine of ten true models lies")]
+    within_band: Annotated[
+        bool,
+        Meta(description="whether no error is above its band: pooled, of the primary signal, held out"),
+    ]
+    holdout_over_floor: Annotated[
+        float | None, Meta(description="over_floor of what was not fitted; null: nothing was held out")
+    ]
+    holdout_floor_band: Annotated[list[float] | None, Meta(description="floor_band of the same")]
     sentences: Annotated[list[str], Meta(description="the answer in words, the first one first")]
     warnings: Annotated[list[str], Meta(description="what the answer must be read with")]
     signals: Annotated[dict[str, SignalErrorJson], Meta(description="errors over all fitted recordings, by signal")]
@@ -458,6 +514,9 @@ def as_dict(comparison: Comparison) -> ComparisonJson:
         "adequate": comparison.adequate,
         "over_floor": comparison.over_floor,
         "floor_band": list(comparison.floor_band),
+        "within_band": comparison.is_within_band,
+        "holdout_over_floor": None if comparison.unseen is None else comparison.unseen.error,
+        "holdout_floor_band": None if comparison.unseen is None else list(comparison.unseen.band),
         "sentences": list(comparison.sentences),
         "warnings": list(comparison.warnings),
         "signals": {name: _error(error) for name, error in comparison.signals.items()},
@@ -465,12 +524,14 @@ def as_dict(comparison: Comparison) -> ComparisonJson:
         "calibration": None
         if comparison.calibration is None
         else calibration_dict(comparison.calibration, comparison.actuator.axes),
-        "identifiable": combinations(comparison.calibration, comparison.actuator.axes),
+        "identifiable": combinations(
+            () if comparison.calibration is None else comparison.calibration.identifiable, comparison.actuator.axes
+        ),
         "explained_by": [
             {
                 "variable": one.variable,
                 "modulator": one.modulator,
-                "r2": one.r2,
+                "r2": one.share,
                 "significant": one.significant,
                 "signal": one.signal,
                 "sentence": one.sentence,
@@ -497,6 +558,7 @@ def _region(one: Region) -> RegionJson:
         "to": one.high,
         "rmse": one.rmse,
         "mean": one.mean,
+        "over_floor": one.excess,
         "sentence": one.sentence,
     }
 
@@ -554,6 +616,9 @@ def _error(error: SignalError) -> SignalErrorJson:
         "noise_floor": error.noise_floor,
         "rmse_initial": error.rmse_initial,
         "mean_absolute": error.mean_absolute,
+        "over_floor": error.in_floors.error,
+        "floor_band": list(error.in_floors.band),
+        "counted": error.is_counted,
         "informative": not error.silent,
     }
 
@@ -568,19 +633,6 @@ def calibration_dict(calibration: Calibration, axes: Axes) -> CalibrationJson:
         "outside_tolerance": [on_axes(name, axes).path for name in calibration.outside_tolerance],
         "confounded": [[on_axes(a, axes).path, on_axes(b, axes).path] for a, b in calibration.confounded],
     }
-
-
-def combinations(calibration: Calibration | None, axes: Axes) -> list[CombinationJson]:
-    """What a calibration knows only together, by the names in files."""
-    return [
-        {
-            "members": {on_axes(name, axes).path: power for name, power in one.powers.items()},
-            "combination": product_in_words(one, axes),
-            "value": one.value,
-            "interval90": list(one.interval90),
-        }
-        for one in (() if calibration is None else calibration.identifiable)
-    ]
 
 
 def parameter_dict(one: Calibrated) -> ParameterJson:

@@ -12,14 +12,15 @@ from ema_model.actuator import Actuator
 from ema_model.actuator.parameters import on_axes
 from ema_model.comparison.criteria import BEYOND, SLOW
 from ema_model.comparison.explain import Explanation, Order, explain, residual_orders, used_blocks
+from ema_model.comparison.over_floor import OverFloor, is_counted, ratio
 from ema_model.comparison.regions import Event, Region, events, worst_regions
-from ema_model.comparison.residuals import OPEN_LOOP, Residuals, order_sentence
+from ema_model.comparison.residuals import OPEN_LOOP, Residuals, dependence, order_sentence
 from ema_model.comparison.result import Compared, SignalError
 from ema_model.estimation import Calibration
-from ema_model.estimation.floor import CONSTANT, CORRELATED_S, ORDER_OF_PRIMARY, POSITIONS, SPEED
+from ema_model.estimation.floor import CONSTANT, CORRELATED_S, ORDER_OF_PRIMARY
 from ema_model.quantities.axes import of_residual, of_signal
 from ema_model.quantities.numbers import Quantity
-from ema_model.quantities.titles import in_sentence
+from ema_model.quantities.titles import all_of, in_sentence
 from ema_model.recordings import SIGNALS
 
 Array = NDArray[np.float64]
@@ -49,10 +50,12 @@ def judge(
     actuator: Actuator,
     recordings: Sequence[str] = (),
     spread: float = 0.0,
+    floor_band: tuple[float, float] = (0.0, np.inf),
 ) -> Judgement:
     """Explains the residual of the first signal of interest, the current where it is measured, if it tells anything.
 
-    recordings: their names, for what happened at one moment of one; spread: as of `most_of_floor`.
+    recordings: their names, for what happened at one moment of one; spread: as of `most_of_floor`; floor_band: between
+    which nine of ten true models' errors lie.
     """
     primary = next(name for name in ORDER_OF_PRIMARY if name in residuals.values)
     explained = explain(residuals, primary, actuator.axes)
@@ -61,7 +64,8 @@ def judge(
     significant = [one for one in explained if one.significant]
     names = judged(residuals.values)
     error = over_floor(residuals, names)
-    within = error <= most_of_floor(spread) and not lasting(residuals, names)
+    slow = lasting(residuals, names)
+    within = error <= most_of_floor(spread) and not slow
     if errors[actuator.axes.signal(primary)].silent:
         warnings = _warnings(residuals, primary, calibration, actuator)
         return _nothing_told(residuals, errors, primary, actuator, error, warnings)
@@ -74,7 +78,13 @@ def judge(
         if orders and significant and significant[0].variable == "motor_angle":
             sentences.append(_order(orders[0], primary, residuals, actuator))
         sentences += [one.sentence for one in regions[:3]]
-    sentences += [_summary(of_signal(primary, actuator.axes), errors[shown], adequate)]
+    told = OverFloor(error, floor_band)
+    if adequate:
+        sentences.append(_explained(of_signal(primary, actuator.axes), errors[shown], told))
+    else:
+        why = "" if told.is_above else _yet_missing(significant, slow, calibration, actuator)
+        but = f" Its size is that of noise, but {why}." if why else ""
+        sentences.append(_off(of_signal(primary, actuator.axes), errors[shown]) + but)
     return Judgement(
         residuals=residuals,
         primary=shown,
@@ -127,7 +137,7 @@ def silence(one: Compared, actuator: Actuator) -> str:
 def judged(signals: Iterable[str]) -> list[str]:
     """Those whose error is pooled: a speed is mostly a position's difference, and counts where there is none."""
     names = list(signals)
-    return [name for name in names if name != SPEED or not set(POSITIONS) & set(names)]
+    return [name for name in names if is_counted(name, names)]
 
 
 def most_of_floor(spread: float) -> float:
@@ -142,13 +152,7 @@ def _order(order: Order, primary: str, residuals: Residuals, actuator: Actuator)
 
 def over_floor(residuals: Residuals, names: Sequence[str]) -> float:
     """rms of the residual over its floor, pooled over signals; where the drive is at its limits nothing is counted."""
-    squared = counted = 0.0
-    weights = _weights(residuals)
-    for name in names:
-        used = np.isfinite(residuals.values[name]) & ~residuals.saturated
-        squared += float(weights[used] @ (residuals.values[name][used] / residuals.sigma[name][used]) ** 2)
-        counted += float(weights[used].sum())
-    return float(np.sqrt(squared / counted)) if counted else 0.0
+    return ratio(residuals, names)
 
 
 def lasting(residuals: Residuals, names: Sequence[str]) -> list[str]:
@@ -179,13 +183,33 @@ def _weights(residuals: Residuals) -> Array:
     return np.ones(residuals.blocks) if residuals.counts is None else residuals.counts
 
 
-def _summary(signal: Quantity, error: SignalError, adequate: bool) -> str:
+def _explained(signal: Quantity, error: SignalError, all_signals: OverFloor) -> str:
+    """Of a model that is adequate; of one whose error is above the band no more than that."""
+    shown = error.quantity(signal)
+    size, floor, title = f"{shown.text(error.rmse)} rms", shown.text(error.noise_floor), in_sentence(signal.title)
+    if all_signals.is_above or error.in_floors.is_above:
+        left = f"the {title} is off by {size}, where noise and the model's own floor are {floor}"
+        return f"A little more is left than noise explains, and no variable explains it: {left}."
+    left = f"the residual {title}, {size}, is noise and the model's own floor ({floor})"
+    return f"The model explains the recordings: {left}."
+
+
+def _off(signal: Quantity, error: SignalError) -> str:
     shown = error.quantity(signal)
     size, floor = f"{shown.text(error.rmse)} rms", shown.text(error.noise_floor)
-    if adequate:
-        left = f"the residual {in_sentence(signal.title)}, {size}, is noise and the model's own floor ({floor})"
-        return f"The model explains the recordings: {left}."
     return f"The {in_sentence(signal.title)} is off by {size}, where noise and the model's own floor are {floor}."
+
+
+def _yet_missing(
+    significant: Sequence[Explanation], slow: Sequence[str], calibration: Calibration | None, actuator: Actuator
+) -> str:
+    """Why a model is not adequate whose error is as small as a true model's."""
+    if significant:
+        return f"it goes with {dependence(significant[0].variable, significant[0].modulator)}"
+    if slow:
+        titles = [in_sentence(of_signal(name, actuator.axes).title) for name in slow]
+        return f"that of the {all_of(titles)} lasts longer than noise"
+    return "the calibration has not converged" if calibration is not None and not calibration.converged else ""
 
 
 def _warnings(residuals: Residuals, primary: str, calibration: Calibration | None, actuator: Actuator) -> list[str]:

@@ -16,7 +16,7 @@ from ema_model.discovery.evidence.outside_tolerance import outside_tolerance
 from ema_model.discovery.evidence.remaining import left_by
 from ema_model.discovery.evidence.uncertainty import with_intervals
 from ema_model.discovery.observed.repeated import repeated
-from ema_model.discovery.result import Candidate, Discovery, Experiment
+from ema_model.discovery.result import Candidate, Discovery, Experiment, errors_of
 from ema_model.discovery.steps.begin import begun
 from ema_model.discovery.steps.path import Story
 from ema_model.discovery.steps.second_opinion import other_loop, support_of
@@ -97,7 +97,10 @@ def result_of(
     calibration = with_intervals(story.data, story.current)
     events = left_by(story.data, story.without_curve).events
     names = named_in(story)
-    added = [replace(refreshed(one, calibration), supported_by=support_of(story, one.name)) for one in story.added]
+    added = [
+        replace(refreshed(one, calibration), supported_by=support_of(story, one.name), **errors_of(story.ladder, one))
+        for one in story.added
+    ]
     named = [one for one in added if one.name in names]
     faults = {name: calibration.parameters[name] for name in story.current.faults}
     outside = outside_tolerance(story.data, story.current)

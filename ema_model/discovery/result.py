@@ -12,6 +12,7 @@ from ema_model.actuator import Actuator
 from ema_model.comparison.explain import Explanation
 from ema_model.comparison.free_simulation import Simulated
 from ema_model.comparison.loop_lag import LoopLag
+from ema_model.comparison.over_floor import OverFloor
 from ema_model.comparison.regions import Event
 from ema_model.discovery.criteria import EVIDENCE, FAR
 from ema_model.discovery.observed.controller import ControllerSeen
@@ -148,6 +149,36 @@ class Contradiction:
     after: float  # the same once that is put right
 
 
+def errors_of(ladder: Sequence[Rung], one: Added) -> dict[str, float | None]:
+    """The errors before and after the last step of a ladder that added an effect, as fields of `Added`."""
+    steps = [i for i, rung in enumerate(ladder) if i and _adds(rung.change, one.name, one.stands_for)]
+    if not steps:
+        return {}
+    after, first = ladder[steps[-1]], steps[-1]
+    while ladder[first].change.kind == "replaced":  # what it came in the place of had taken its part before
+        name = ladder[first].change.names[0]
+        earlier = [i for i in range(1, first) if _adds(ladder[i].change, name)]
+        if not earlier:
+            break
+        first = earlier[-1]
+    before = ladder[first - 1]
+    return {
+        "rmse_before": before.rmse,
+        "rmse_after": after.rmse,
+        "holdout_before": before.holdout_rmse,
+        "holdout_after": after.holdout_rmse,
+    }
+
+
+def _adds(change: Change, name: str, stands_for: str = "") -> bool:
+    """Whether a step adds that effect, or frees the parameter that it stands for."""
+    if change.kind == "replaced":
+        return change.names[1] == name
+    if change.kind == "parameter":
+        return bool(stands_for) and stands_for in change.names
+    return change.kind == "effect" and name in change.names
+
+
 def misses_unseen(last: Rung, disagreements: Sequence[Contradiction]) -> bool:
     """Whether a model is far off what was not fitted, and that has no other sign, zero, unit or actuator to blame."""
     unseen = last.holdout_rmse
@@ -190,6 +221,23 @@ class Discovery(InWords):
     def floor_band(self) -> tuple[float, float]:
         """Multiples of the floor, between which nine of ten true models' errors lie."""
         return self.data.floor_band
+
+    @property
+    def in_floors(self) -> OverFloor:
+        """The error of the last model, with its band."""
+        return OverFloor(self.ladder[-1].rmse, self.floor_band)
+
+    @property
+    def unseen(self) -> OverFloor | None:
+        """The same of what was held out; None without any."""
+        error = self.ladder[-1].holdout_rmse
+        return None if self.held is None or error is None else OverFloor(error, self.held.floor_band)
+
+    @property
+    def is_within_band(self) -> bool:
+        """Whether neither is above its band, where errors may be counted in floors at all."""
+        told = [one for one in (self.in_floors, self.unseen) if one is not None and self.floor_believable]
+        return not any(one.is_above for one in told)
 
     @property
     def floor_believable(self) -> bool:

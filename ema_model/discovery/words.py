@@ -20,19 +20,17 @@ from ema_model.comparison.loop_lag import BLAMED, LoopLag
 from ema_model.comparison.residuals import dependence
 from ema_model.comparison.result import (
     CalibrationJson,
-    CombinationJson,
     EventJson,
     ParameterJson,
     SimulatedJson,
     calibration_dict,
-    combinations,
     event_dict,
     free_simulation,
     parameter_dict,
     plain,
     simulation_dict,
 )
-from ema_model.comparison.verdict import ORDER_OF_PRIMARY, most_of_floor
+from ema_model.comparison.verdict import ORDER_OF_PRIMARY
 from ema_model.discovery.criteria import FAR
 from ema_model.discovery.observed.controller import ControllerSeen
 from ema_model.discovery.result import VERDICTS, Added, Candidate, Change, Discovery, Experiment, Rung, misses_unseen
@@ -41,7 +39,7 @@ from ema_model.effects import CATALOGUE, find
 from ema_model.effects.effect import FAMILIES
 from ema_model.errors import InputError
 from ema_model.estimation import Calibrated
-from ema_model.estimation.calibrate import together
+from ema_model.estimation.calibrate import CombinationJson, combinations, together
 from ema_model.faults import BY_NAME, FAULTS, NAMES, cause_of, causes, vector
 from ema_model.quantities.axes import Axes, of_signal
 from ema_model.quantities.numbers import IntervalJson, Quantity, amount, number, with_uncertainty
@@ -342,11 +340,22 @@ def _parameters(found: Discovery, one: Added) -> dict[str, str]:
 
 
 def ladder(found: Discovery) -> Table:
-    """Errors in floors; in the signals' units where the floor is not to be believed."""
+    """Errors in floors, beside those of the signal that tells most; in all units where no floor is to be believed."""
     if not found.floor_believable:
         return ladder_by_signal(found)
-    errors = [[_three(one.rmse), _three(one.holdout_rmse)] for one in found.ladder]
-    return _steps(found, ("fitted", "held out"), errors, "(1 is the floor)")
+    first = primary(found)
+    shown = of_signal(first, found.actuator.axes).scaled([one.signals[first] for one in found.ladder])
+    title = f"{in_sentence(shown.title)} [{shown.unit}]"
+    held = any(first in one.holdout_signals for one in found.ladder)
+    errors = [
+        [
+            *(_in_floors(error) for error in (one.rmse, one.holdout_rmse)),
+            *(_in_unit(of.get(first), shown) for of in (one.signals, one.holdout_signals)[: 1 + held]),
+        ]
+        for one in found.ladder
+    ]
+    heads = ("fitted", "held out", title, "held out")
+    return _steps(found, heads[: 3 + held], errors, "(1 is the floor; rms)")
 
 
 def ladder_by_signal(found: Discovery) -> Table:
@@ -402,8 +411,12 @@ def _refitted(one: Candidate) -> str:
     return f"{one.refitted_drop:.0f}".replace("-", "−")
 
 
-def _three(rmse: float | None) -> str:
-    return "" if rmse is None else f"{rmse:.3f}"
+def _in_floors(error: float | None) -> str:
+    return "" if error is None else number(error)
+
+
+def _in_unit(error: float | None, shown: Quantity) -> str:
+    return "" if error is None else number(shown.factor * error)
 
 
 # --- further sentences of a discovery, as page, reports and recordings show them --------------------------------------
@@ -587,6 +600,10 @@ class RemainingJson(TypedDict):
 
     rmse: Annotated[float | None, Meta(description=f"{_RMSE}; null: the floor is not to be believed")]
     at_floor: Annotated[bool, Meta(description="whether it may be noise and the model's own floor")]
+    within_band: Annotated[
+        bool | None,
+        Meta(description="whether neither it nor the error of what was held out is above its band"),
+    ]
 
 
 class ExperimentJson(TypedDict):
@@ -677,6 +694,7 @@ class DiscoveryJson(TypedDict):
     unknown: Annotated[UnknownJson | None, Meta(description="what no effect explains; null: nothing that is told")]
     floor_believable: Annotated[bool, Meta(description="whether errors may be counted in floors")]
     floor_band: Annotated[list[float], Meta(description="between which rmse of nine of ten true models lies")]
+    holdout_floor_band: Annotated[list[float] | None, Meta(description="floor_band of what was held out; null: none")]
     repeatability: Annotated[RepeatabilityJson | None, Meta(description="null: no command was recorded twice")]
     remaining: Annotated[RemainingJson, Meta(description="the error of the last model")]
     not_claimed: Annotated[dict[str, str], Meta(description="effects that the data would pay for, and why not")]
@@ -699,11 +717,11 @@ def as_dict(found: Discovery) -> DiscoveryJson:
     document: DiscoveryJson = {
         "verdict": found.verdict,
         "calibration": calibration_dict(found.calibration, axes),
-        "identifiable": combinations(found.calibration, axes),
-        "effects": [_added(one, axes) for one in found.effects],
+        "identifiable": combinations(found.calibration.identifiable, axes),
+        "effects": [_added(found, one) for one in found.effects],
         "ladder": [_rung(rung, axes, is_believable) for rung in found.ladder],
         "simulation": simulation_dict(found.simulation),
-        "candidates": [_candidate(one, axes) for one in found.candidates],
+        "candidates": [_candidate(one, axes) for one in found.ranked],
         "faults": {name: parameter_dict(one) for name, one in found.faults.items()},
         "parameters_outside_tolerance": [on_axes(name, axes).path for name in found.parameters_outside_tolerance],
         "unknown": None
@@ -711,9 +729,9 @@ def as_dict(found: Discovery) -> DiscoveryJson:
         else {
             "variable": unknown.variable,
             "modulator": unknown.modulator,
-            "r2": unknown.r2,
+            "r2": unknown.share,
             "curve": np.column_stack([unknown.centres, unknown.curve, unknown.error]).tolist(),
-            "added": None if found.curve is None else _added(found.curve, axes),
+            "added": None if found.curve is None else _added(found, found.curve),
         },
         "floor_believable": is_believable,
         "floor_band": list(found.floor_band),
@@ -724,7 +742,12 @@ def as_dict(found: Discovery) -> DiscoveryJson:
             "over_floor": twice.apart,
             "signals": {axes.signal(name): value for name, value in twice.signals.items()},
         },
-        "remaining": {"rmse": found.ladder[-1].rmse if is_believable else None, "at_floor": found.at_floor},
+        "holdout_floor_band": None if found.unseen is None else list(found.unseen.band),
+        "remaining": {
+            "rmse": found.in_floors.error if is_believable else None,
+            "at_floor": found.at_floor,
+            "within_band": found.is_within_band if is_believable else None,
+        },
         "not_claimed": dict(found.not_claimed),
         "next_experiment": _experiment(found.next_experiment),
         "controller_mismatch": found.controller_seen is not None or found.loop_lag is not None,
@@ -813,14 +836,17 @@ def _experiment(one: Experiment | None) -> ExperimentJson | None:
     }
 
 
-def _added(one: Added, axes: Axes) -> AddedJson:
-    found: dict[str, EffectParameterJson] = {name: {**parameter_dict(its)} for name, its in one.parameters.items()}
+def _added(found: Discovery, one: Added) -> AddedJson:
+    axes = found.actuator.axes
+    parameters: dict[str, EffectParameterJson] = {
+        name: {**parameter_dict(fitted_of(found, one, name))} for name in one.parameters
+    }
     for name, value in one.chosen.items():
-        found[name] = {"value": value, "interval90": [value, value], "unit": ""}
+        parameters[name] = {"value": value, "interval90": [value, value], "unit": ""}
     return {
         "name": one.name,
         "family": find(one.name).family,
-        "parameters": {on_axes(f"effects.{one.key}.{name}", axes).name: facts for name, facts in found.items()},
+        "parameters": {on_axes(f"effects.{one.key}.{name}", axes).name: facts for name, facts in parameters.items()},
         "rmse_before": one.rmse_before,
         "rmse_after": one.rmse_after,
         "holdout_rmse_before": one.holdout_before,
@@ -844,7 +870,6 @@ VERDICT_WORDS = {
 }
 _MOVED, _MOST_MOVED = 0.5, 3  # σ of a tolerance, from which on a parameter's own value is worth a word; of those
 _HARDLY = 0.02  # of the held-out error: what moves it by less is hardly seen there
-_NEAR = 1.2  # times the floor, below which a digit more tells a true model from another
 FLOOR_NOTE = (
     "Errors are rms over all fitted signals in units of the floor: 1 is what noise and the model's own limits leave. "
     "Nine of ten true models end within the band that is drawn."
@@ -860,7 +885,12 @@ def headline(found: Discovery) -> str:
     """The verdict in one sentence; in two where the controller is not the file's."""
     if found.controller_seen is None:
         return _answer(found) if found.loop_lag is None else f"{BLAMED} {_answer(found)}"
-    if found.verdict == "adequate" and not found.parameters_outside_tolerance and not found.not_claimed:
+    if (
+        found.verdict == "adequate"
+        and not found.parameters_outside_tolerance
+        and not found.not_claimed
+        and found.is_within_band
+    ):
         return "The controller is not what the file says; without it, motion and current show nothing else missing."
     return f"The controller is not what the file says. Without it: {in_sentence(_answer(found))}"
 
@@ -877,6 +907,8 @@ def _answer(found: Discovery) -> str:
         return f"The search was cut off. Found so far: {all_of(has)}."
     if found.verdict == "effects_found":
         return f"The model lacks {_named(found)}{f', and the actuator has {faulty}' if faulty else ''}."
+    if found.verdict == "adequate" and found.floor_believable and found.in_floors.is_above:
+        return _nearly_adequate(found, faulty)
     if found.verdict == "adequate" and faulty:
         return f"No physics is missing: the actuator has {faulty}."
     if found.verdict == "adequate" and found.parameters_outside_tolerance:
@@ -896,6 +928,18 @@ def _answer(found: Discovery) -> str:
         return f"Something is missing that none of the known effects explains: {remains(found)}."
     text = VERDICT_WORDS.get(found.verdict, verdict_name(found))
     return f"{text[:1].upper()}{text[1:]}."
+
+
+def _nearly_adequate(found: Discovery, faulty: str) -> str:
+    """Of a model that passes, though more is left than nine of ten true ones leave: no more than that is said."""
+    floors = found.in_floors
+    told = f"At {floors.text} times the floor, where a true model's error is {floors.band_text}, {floors.more}"
+    first = f"The actuator has {faulty}. " if faulty else ""
+    if found.parameters_outside_tolerance:
+        first += "Not all parameters are within their tolerance. "
+    if found.not_claimed:
+        return f"{first}{told}, and nothing that was tried can be claimed for it."
+    return f"{first}{told}, and no effect of the library explains it."
 
 
 def _named(found: Discovery) -> str:
@@ -925,8 +969,8 @@ def remains(found: Discovery) -> str:
     shaft = "" if found.transmission_seen is None else f"; and {found.transmission_seen.short}"
     rest, unseen = found.ladder[-1].rmse, found.ladder[-1].holdout_rmse
     if unseen is not None and rest < FAR and misses_unseen(found.ladder[-1], found.disagreements):
-        return f"what was not fitted is missed by {number(unseen, 2)} times the floor, cause unknown{goes}{shaft}"
-    return f"{number(rest, 2 if rest > _NEAR else 3)} times the floor remains, cause unknown{goes}{shaft}"
+        return f"what was not fitted is missed by {number(unseen)} times the floor, cause unknown{goes}{shaft}"
+    return f"{number(rest)} times the floor remains, cause unknown{goes}{shaft}"
 
 
 def repeatability(found: Discovery) -> list[str]:
@@ -954,15 +998,19 @@ def sentences(found: Discovery) -> list[str]:
     first, last = found.ladder[0], found.ladder[-1]
     added = len(found.effects) + len(causes(found.faults))
     if added:
-        told.append(f"With {'it' if added == 1 else 'them'} the error falls from {_times(first, last)}.")
+        told.append(
+            f"With {'it' if added == 1 else 'them'} the error falls from {_times(first, last)}. "
+            + _fall_in_unit(found, first, last)
+        )
         told += masked(found.effects, found.actuator.axes)
     else:
         bare = found.ladder[-2] if found.curve is not None else last  # a curve is no part of the calibrated model
         held = "" if bare.holdout_rmse is None else f" ({number(bare.holdout_rmse)} times on what was not fitted)"
-        told.append(f"The calibrated model's error is {number(bare.rmse)} times the floor{held}.")
+        told.append(
+            f"The calibrated model's error is {number(bare.rmse)} times the floor{held}. {_rms_in_unit(found, bare)}"
+        )
     if found.floor_believable:
-        low, high = found.floor_band
-        told.append(f"A true model's error is {low:.2f} to {high:.2f} times the floor (90 % interval).")
+        told.append(f"A true model's error is {found.in_floors.band_text} times the floor (90 % interval).")
     told += not_fitted(found)
     if found.faults:
         told.append(f"{'; '.join(faults(found).values())}. Effects and faults are estimated together.")
@@ -988,12 +1036,10 @@ def sentences(found: Discovery) -> list[str]:
 
 def not_fitted(found: Discovery) -> list[str]:
     """That a model that is at its floor is not there on what was held out."""
-    error = found.ladder[-1].holdout_rmse
-    at_floor = found.verdict in ("adequate", "effects_found") and found.floor_believable
-    if not at_floor or found.held is None or error is None or error <= most_of_floor(found.held.floor_spread):
+    at_floor, unseen = found.verdict in ("adequate", "effects_found") and found.floor_believable, found.unseen
+    if not at_floor or unseen is None or not unseen.is_above:
         return []
-    low, high = found.held.floor_band
-    told = f"{number(error)} times its floor, where a true model's error is {low:.2f} to {high:.2f} times"
+    told = f"{unseen.text} times its floor, where a true model's error is {unseen.band_text} times"
     return [f"What was not fitted is off by {told}: the model does not tell all of it."]
 
 
@@ -1077,6 +1123,23 @@ def document_of(found: Discovery) -> Document:
             *([Lines(asked)] if asked else []),
         ]
     )
+
+
+def _rms_in_unit(found: Discovery, rung: Rung) -> str:
+    """'That is 42.1 mA rms of the equivalent current (51.0 mA on what was not fitted).'"""
+    name = primary(found)
+    shown = of_signal(name, found.actuator.axes).scaled(rung.signals[name])
+    unseen = rung.holdout_signals.get(name)
+    held = "" if unseen is None else f" ({shown.text(unseen)} on what was not fitted)"
+    return f"That is {shown.text(rung.signals[name])} rms of the {in_sentence(shown.title)}{held}."
+
+
+def _fall_in_unit(found: Discovery, first: Rung, last: Rung) -> str:
+    """'The equivalent current's falls from 61.1 to 4.69 mA rms.'"""
+    name = primary(found)
+    shown = of_signal(name, found.actuator.axes).scaled([first.signals[name], last.signals[name]])
+    fall = f"from {number(shown.factor * first.signals[name])} to {shown.text(last.signals[name])} rms"
+    return f"That of the {in_sentence(shown.title)} falls {fall}."
 
 
 def _times(first: Rung, last: Rung) -> str:

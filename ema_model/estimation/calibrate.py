@@ -5,8 +5,10 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import Annotated, TypedDict
 
 import numpy as np
+from msgspec import Meta
 from numpy.typing import ArrayLike, NDArray
 
 from ema_model.actuator import Actuator
@@ -24,11 +26,11 @@ from ema_model.estimation.problem import (
     starts_of,
     unknowns_of,
 )
-from ema_model.faults import NAMES, named
+from ema_model.faults import FACTORS, NAMES, named
 from ema_model.models import Model
 from ema_model.models.model import Signals
 from ema_model.quantities.axes import Axes
-from ema_model.quantities.numbers import HALF_90, number, with_uncertainty
+from ema_model.quantities.numbers import HALF_90, IntervalJson, number, with_uncertainty
 from ema_model.quantities.titles import in_sentence
 from ema_model.side_by_side import windows
 from ema_model.text import Severity, Table
@@ -170,9 +172,9 @@ def _floors_left(
 
 
 def convergence(fit: Calibration) -> str:
-    """'It has converged; χ² per value 1.02 (1 is the floor), 87 evaluations.'"""
-    how = "It has converged" if fit.converged else "It has not converged: its values are not to be trusted"
-    return f"{how}; χ² per value {number(fit.chi2_per_value)} (1 is the floor), {fit.evaluations} evaluations."
+    """'It has converged after 87 evaluations.'"""
+    how = "It has converged" if fit.converged else "It has not converged: its values are not to be trusted,"
+    return f"{how} after {fit.evaluations} evaluations."
 
 
 def calibration_table(fit: Calibration, axes: Axes, among: Collection[str] | None = None) -> Table | None:
@@ -215,20 +217,23 @@ def together(fit: Calibration, axes: Axes) -> list[str]:
     """'Known only together, if the model is right: gain · torque constant / resistance = 0.0230 ± 0.0021. …'"""
     if not fit.identifiable:
         return []
-    found = []
-    for one in fit.identifiable:
-        low, high = one.interval90
-        found.append(f"{product_in_words(one, axes)} = {with_uncertainty(one.value, 0.5 * (high - low), '')}")
+    found = [combination_in_words(one, axes) for one in fit.identifiable]
     silent = "current_A" not in {name for part in fit.weighted_sensitivities for name in part}
     how = "Record the current as well, or measure one of them apart" if silent else "Measure one of them apart"
     return [f"Known only together, if the model is right: {'; '.join(found)}. {how}."]
 
 
+def combination_in_words(one: Combination, axes: Axes) -> str:
+    """'gain · torque constant / resistance = 0.0230 ± 0.0021'"""
+    low, high = one.interval90
+    return f"{product_in_words(one, axes)} = {with_uncertainty(one.value, 0.5 * (high - low), '')}"
+
+
 def product_in_words(one: Combination, axes: Axes) -> str:
-    """'gain · torque constant / resistance²'"""
+    """'gain · torque constant / resistance²'; a fault by its factor, '(1 − k3)'."""
     above, below = (
         [
-            f"{in_sentence(_title(name, axes))}{'²' if abs(power) == 2 else ''}"
+            f"{FACTORS.get(name) or in_sentence(_title(name, axes))}{'²' if abs(power) == 2 else ''}"
             for name, power in one.powers.items()
             if (power > 0) is over
         ]
@@ -236,6 +241,28 @@ def product_in_words(one: Combination, axes: Axes) -> str:
     )
     divided = f" / {below[0]}" if len(below) == 1 else f" / ({' · '.join(below)})" if below else ""
     return f"{' · '.join(above)}{divided}"
+
+
+class CombinationJson(TypedDict):
+    """Parameters that are known only together, as the product of their powers."""
+
+    members: Annotated[dict[str, int], Meta(description="powers by the names in the actuator's file")]
+    combination: Annotated[str, Meta(description="the product in words")]
+    value: Annotated[float, Meta(description="of the product, in SI units")]
+    interval90: Annotated[IntervalJson, Meta(description="the ends of the 90 % interval about value")]
+
+
+def combinations(known: Sequence[Combination], axes: Axes) -> list[CombinationJson]:
+    """What is known only together, by the names in files."""
+    return [
+        {
+            "members": {on_axes(name, axes).path: power for name, power in one.powers.items()},
+            "combination": product_in_words(one, axes),
+            "value": one.value,
+            "interval90": list(one.interval90),
+        }
+        for one in known
+    ]
 
 
 def _title(path: str, axes: Axes) -> str:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import lru_cache
 
 import numpy as np
@@ -16,10 +16,12 @@ from ema_model.commands import command
 from ema_model.errors import InputError
 from ema_model.estimation.calibrate import driven_to_bound
 from ema_model.estimation.floor import CORRELATED_S, Floor, repeats_of, silent
+from ema_model.estimation.information import Combination, known_together
 from ema_model.estimation.problem import ECCENTRICITY, K_SIGMA, Problem, polar, to_vector
 from ema_model.identification.fit import FAULTS, TWINS, Fitted
 from ema_model.identification.search import logged_apart
 from ema_model.models import ClosedLoop
+from ema_model.quantities.axes import of_signal
 from ema_model.quantities.numbers import HALF_90
 from ema_model.quantities.titles import in_sentence
 from ema_model.recordings import SIGNALS as SIGNAL_NAMES
@@ -60,8 +62,9 @@ def adequacy(found: Fitted) -> Adequacy:
     for name, (size, slow) in sizes.items():
         if size > _SIZE or slow > _SLOW:
             ratio = max(size, slow)
-            title = in_sentence(SIGNAL_NAMES[name].title)
-            return Adequacy(False, ratio, f"the {title} is left {ratio:.1f} × its floor")
+            shown = of_signal(name, found.problem.model.actuator.axes)
+            left = f"{shown.scaled(rms := _in_unit(found, name)).text(rms)} rms"
+            return Adequacy(False, ratio, f"the {in_sentence(shown.title)} is left {ratio:.1f} × its floor ({left})")
     axes = found.problem.model.actuator.axes
     edge = [
         in_sentence(on_axes(one.name, axes).title)
@@ -95,6 +98,16 @@ def _sizes(found: Fitted) -> dict[str, tuple[float, float]]:
         slow_rms = _rms(slow) if slow and name == "current_A" else 0.0
         found_sizes[name] = (_rms(values), slow_rms)
     return found_sizes
+
+
+def _in_unit(found: Fitted, signal: str) -> float:
+    """rms of what is left of a signal, in its unit, the model's known bias added."""
+    parts: list[Floating] = [
+        found.residual[rows] / found.problem.over_sigma(window, name, np.ones(rows.stop - rows.start))
+        for window, name, rows in found.problem.parts()
+        if name == signal
+    ]
+    return _rms(parts)
 
 
 def _rms(parts: list[Floating]) -> float:
@@ -330,6 +343,7 @@ class Uncertainty:
     uninformative: bool = False  # the recordings tell nothing of any model
     warnings: tuple[str, ...] = ()
     separated_by: Suggestion | None = None  # the run that would tell the groups apart, and the hardly known
+    identifiable: tuple[Combination, ...] = ()  # what is known only together, of k's factors and the parameters
     covariance: Array = field(default_factory=lambda: np.zeros((FAULTS, FAULTS)))  # of k
     detectable: Array = field(default_factory=lambda: np.zeros(8))  # (8,) from healthy, where an alarm begins; k7: NaN
     # Of k with the eccentricity as a vector: the best one without bounds (8,), and its covariance in two parts, what
@@ -366,6 +380,7 @@ def uncertainty(found: Fitted, k: Array) -> Uncertainty:
         uninformative=best.fit.uninformative,
         warnings=(*_warnings(best.fit), *logged_apart(found, best.of_x)),
         separated_by=separating(found, best.covariance, unclear) if unclear else None,
+        identifiable=_identifiable([found, *found.rivals], best) if best.fit.adequate else (),
         covariance=best.covariance,
         detectable=_detectable(best),
         unbounded=best.free,
@@ -410,6 +425,37 @@ def _basin(found: Fitted, k: Array) -> _Basin:
         bool(healthy and fit.adequate),
         () if healthy or not fit.adequate else _alarms(free, covariance),
     )
+
+
+def _identifiable(fits: Sequence[Fitted], best: _Basin) -> tuple[Combination, ...]:
+    """Products of what faults multiply, and of parameters, that are known far better than any of their factors.
+
+    Where other basins fit as well, as surely as they agree.
+    """
+    unknowns = fits[0].problem.unknowns
+    chosen = [i for i, one in enumerate(unknowns) if one.is_scale or one.name in faults.FACTORS]
+    names, sigmas = [unknowns[i].name for i in chosen], np.array([unknowns[i].sigma for i in chosen])
+    slopes = faults.factors(fits[0].k)[1]
+    for place, i in enumerate(chosen):
+        if unknowns[i].kind == "fault":
+            sigmas[place] *= slopes[unknowns[i].place]  # of a phase's turns negative: more of k, fewer turns
+    values = [_scales(one, names) for one in fits]
+    found = known_together(names, values[0], sigmas, best.of_x[np.ix_(chosen, chosen)])
+    apart = [
+        max(
+            abs(sum(power * np.log(each[names.index(name)]) for name, power in one.powers.items()) - np.log(one.value))
+            for each in values
+        )
+        for one in found
+    ]
+    return tuple(replace(one, relative=one.relative + float(more) / HALF_90) for one, more in zip(found, apart))
+
+
+def _scales(found: Fitted, names: Sequence[str]) -> Array:
+    """What faults multiply and parameters are, as a fit has them, by name: (names,)."""
+    of_k = dict(zip(faults.NAMES, faults.factors(found.k)[0]))
+    at = {one.name: one.nominal + one.sigma * x for one, x in zip(found.problem.unknowns, found.x)}
+    return np.array([of_k.get(name, at.get(name, np.nan)) for name in names])
 
 
 def _sigmas(fits: Sequence[Fitted], basins: Sequence[_Basin]) -> dict[str, float]:

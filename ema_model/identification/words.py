@@ -13,6 +13,7 @@ from ema_model import faults
 from ema_model.actuator import Actuator
 from ema_model.actuator.actuator import between, readings, sentences
 from ema_model.actuator.parameters import on_axes
+from ema_model.estimation.calibrate import CombinationJson, combination_in_words, combinations
 from ema_model.identification.run import Identification, Progress, algorithm_title
 from ema_model.identification.search import Landscape, Way
 from ema_model.quantities.numbers import IntervalJson, amount
@@ -70,6 +71,9 @@ def remarks(answer: Identification) -> list[Remark]:
     for group in sure.ambiguous:
         names = " and ".join(_named(name) for name in group)
         told.append(Remark("cannot be told apart", f"{names} do the same to this recording", "warning"))
+    if sure.identifiable:
+        products = "; ".join(combination_in_words(one, answer.actuator.axes) for one in sure.identifiable)
+        told.append(Remark("known only together", f"{products}, if the model is right", "warning"))
     if sure.hardly_known:
         names = ", ".join(_named(name) for name in sure.hardly_known)
         line = f"this recording says hardly anything of {names}, and the other intervals rest on them"
@@ -167,6 +171,10 @@ class IdentificationJson(TypedDict):
     alarms: Annotated[list[str], Meta(description="names of the k that are surely not healthy")]
     ambiguous: Annotated[list[list[str]], Meta(description="groups of k that the recordings cannot separate")]
     hardly_known: Annotated[list[str], Meta(description="k that could be nearly anything")]
+    identifiable: Annotated[
+        list[CombinationJson],
+        Meta(description="what the recordings tell only together; of a k what it multiplies, as 1 + 2 k1 or 1 − k3"),
+    ]
     separated_by: Annotated[str, Meta(description="the run that would tell them, as options of `emaviz simulate`")]
     uninformative: Annotated[bool, Meta(description="whether the recordings tell nothing, whatever the model")]
     adequate: Annotated[bool, Meta(description="whether the model with this k leaves no more than the floor")]
@@ -213,6 +221,7 @@ def as_dict(answer: Identification, actuator: Actuator, holdout_rmse: float | No
         "alarms": list(sure.alarms),
         "ambiguous": [list(group) for group in sure.ambiguous],
         "hardly_known": list(sure.hardly_known),
+        "identifiable": combinations(sure.identifiable, actuator.axes),
         "separated_by": sure.separated_by.options if sure.separated_by else "",
         "uninformative": bool(sure.uninformative),
         "adequate": bool(sure.adequate),

@@ -395,7 +395,7 @@ _EXPLAINED_PALE = 0.3
 def explained(
     comparison: Comparison, signal: str | None = None, *, highlight: Region | None = None, dark: bool = False
 ) -> go.Figure:
-    """Bars for each variable, the most telling on top; those that noise could have made are pale.
+    """Bars for each variable, in the order of the explanations, the best on top; what noise could have made is pale.
 
     highlight: the region's variable is marked.
     """
@@ -404,9 +404,8 @@ def explained(
     title = "What explains the residual"
     if not found:
         return theme.missing(title, "no variable to explain it with is known", dark=dark)
-    best = {v: max(e.r2 for e in found if e.variable == v) for v in dict.fromkeys(e.variable for e in found)}
-    # a horizontal bar chart counts from the bottom
-    variables = sorted(best, key=lambda v: best[v])
+    best = {v: max(e.share for e in found if e.variable == v) for v in dict.fromkeys(e.variable for e in found)}
+    variables = list(best)[::-1]  # a horizontal bar chart counts from the bottom
     chart = theme.new(title, "Explained variance, cross-validated [%]", "", dark=dark)
     names = {v: _name(v, highlight) for v in variables}
     for modulator in reversed(MODULATORS):
@@ -417,7 +416,7 @@ def explained(
         chart.add_trace(
             go.Bar(
                 y=[names[e.variable] for e in shown],
-                x=[100.0 * max(e.r2, 0.0) for e in shown],
+                x=[100.0 * e.share for e in shown],
                 orientation="h",
                 name=MODULATORS[modulator].title,
                 legendrank=list(MODULATORS).index(modulator),
@@ -430,7 +429,7 @@ def explained(
                 hovertemplate="%{x:.1f} %<br>%{customdata}",
             )
         )
-    widest = 100.0 * max(max(best.values()), 0.0)
+    widest = 100.0 * max(best.values())
     chart.update_xaxes(range=[0, min(101.0, max(10.0, 1.1 * widest))])
     chart.update_yaxes(showgrid=False, categoryorder="array", categoryarray=[names[v] for v in variables], nticks=0)
     chart.update_layout(barmode="group", bargap=0.25, hovermode="closest")

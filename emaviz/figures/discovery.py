@@ -192,38 +192,40 @@ _TITLE = "What the residual depends on"
 
 
 def explained_steps(before: Sequence[Explanation], now: Sequence[Explanation], *, dark: bool = False) -> go.Figure:
-    """Two bars a variable, its best modulator's, the most telling before on top; pale where noise could make it.
+    """Two bars a variable, its best modulator's, the best explanation before on top; pale where noise could make it.
 
     One bar where nothing has changed yet.
     """
     runs = {"calibrated model": _best(before), "improved model": _best(now)}
     if before is now:
         runs = {"calibrated model": _best(now)}
-    order = {variable: one.r2 for found in reversed(runs.values()) for variable, one in found.items()}
-    if not order:
+    known = [one for found in runs.values() for one in found.values()]
+    if not known:
         return theme.missing(_TITLE, "no variable to explain it with is known", dark=dark)
-    variables = sorted(order, key=lambda variable: order[variable])  # a horizontal bar chart counts from the bottom
+    variables = list(dict.fromkeys(one.variable for one in known))[
+        ::-1
+    ]  # a horizontal bar chart counts from the bottom
     titles = [variable_title(variable) for variable in variables]
     chart = theme.new(_TITLE, "Explained variance, cross-validated [%]", "", dark=dark)
     for (name, found), colour in zip(reversed(runs.items()), (theme.RESIDUAL, theme.INITIAL)):
-        known = [found.get(variable) for variable in variables]
-        nothing = not any(one is not None and one.r2 > 0.0 for one in known)
+        its = [found.get(variable) for variable in variables]
+        nothing = not any(one is not None and one.share > 0.0 for one in its)
         chart.add_trace(
             go.Bar(
                 y=titles,
-                x=[0.0 if one is None else 100.0 * max(one.r2, 0.0) for one in known],
+                x=[0.0 if one is None else 100.0 * one.share for one in its],
                 orientation="h",
                 name=f"{name} (nothing explained)" if nothing else name,
                 legendrank=list(runs).index(name),
                 marker={
                     "color": colour,
-                    "opacity": [1.0 if one is not None and one.significant else _PALE for one in known],
+                    "opacity": [1.0 if one is not None and one.significant else _PALE for one in its],
                 },
-                customdata=["" if one is None else theme.plain(one.sentence) for one in known],
+                customdata=["" if one is None else theme.plain(one.sentence) for one in its],
                 hovertemplate="%{x:.1f} %<br>%{customdata}",
             )
         )
-    widest = 100.0 * max(max(order.values()), 0.0)
+    widest = 100.0 * max(one.share for one in known)
     chart.update_xaxes(range=[0, min(101.0, max(10.0, 1.1 * widest))])
     chart.update_yaxes(showgrid=False, categoryorder="array", categoryarray=titles, nticks=0)
     chart.update_layout(barmode="group", bargap=0.25, hovermode="closest")
@@ -441,7 +443,7 @@ def _add_left(chart: go.Figure, left: Binned, axis: Quantity, shown: Quantity) -
             y=shown.factor * left.mean,
             error_y={"array": shown.factor * left.error, "thickness": 1, "width": 0, "color": theme.FLOOR},
             mode="markers",
-            name="measured − model",
+            name="measured − model, ± its standard error",
             marker={"size": 5, "color": theme.RESIDUAL},
             hovertemplate="%{y:.3g}",
         )

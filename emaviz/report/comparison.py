@@ -65,7 +65,8 @@ class Answer(Section[Comparison]):
 
 _ERRORS_PER_SIGNAL_NOTE = (
     "The floor is what a perfect model would leave: the sensors' noise, and what the model leaves out on "
-    "purpose (the inverter's switching). An error over floor near 1 cannot be made smaller."
+    "purpose (the inverter's switching). The error over the floor is that of each moment, whose floor may be lower or "
+    "higher than its rms; it is green up to what nine of ten true models leave."
 )
 
 
@@ -306,4 +307,6 @@ def write_report(comparison: Comparison, path: str | Path) -> None:
     names = ", ".join(one.name or "recording" for one in comparison.recordings)
     titles = {"adequate": "The model is adequate", "uninformative": "The recordings tell nothing of the model"}
     title = titles.get(comparison.verdict, "Where the model fails")
+    if comparison.adequate and not comparison.is_within_band:
+        title = "The model leaves a little more than noise"
     write(path, page(title, f"{comparison.actuator.name} against {names}", SECTIONS, comparison))

@@ -26,6 +26,7 @@ from ema_model.discovery.words import (
     primary,
     sentences,
     tracks,
+    value,
     verdict_name,
 )
 from ema_model.effects import Effect, find
@@ -153,13 +154,11 @@ def _parameters(told: Told, one: Added) -> str:
     known = {parameter.name: parameter for parameter in find(one.name, told.found.actuator.axes).parameters}
     rows = []
     for name, setting in one.chosen.items():
-        rows.append([known[name].meaning, known[name].shown, f"{setting:g}", "chosen", known[name].unit or "–"])
+        rows.append([known[name].meaning, known[name].shown, f"{setting:g} {known[name].unit}".strip() + " (chosen)"])
     for name in one.parameters:
         fitted = fitted_of(told.found, one, name)
-        low, high = (number(edge) for edge in fitted.interval90)
-        value = number(fitted.value)
-        rows.append([known[name].meaning, known[name].shown, value, f"{low} … {high}", fitted.unit or "–"])
-    return table(["Parameter", "name", "value", "90 % interval", "unit"], rows, text_columns=2)
+        rows.append([known[name].meaning, known[name].shown, value(fitted)])
+    return table(["Parameter", "name", "value ± 90 % interval"], rows, text_columns=2)
 
 
 def _fall(one: Added) -> str:
@@ -360,4 +359,6 @@ def write_discovery_report(found: Discovery, path: str | Path, configuration: Ma
     told = Told.of(found, configuration or {})
     names = ", ".join(track.name or "recording" for track in told.tracks)
     title = "The model is adequate" if found.verdict == "adequate" else "What the model lacks"
+    if found.verdict == "adequate" and not found.is_within_band:
+        title = "The model leaves a little more than noise"
     write(path, page(title, f"{found.actuator.name} against {names}", SECTIONS, told))

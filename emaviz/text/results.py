@@ -28,8 +28,8 @@ MEANINGS: dict[Meaning, str] = {
 
 
 def of_comparison(comparison: Comparison) -> Meaning:
-    """A comparison says where the model fails, and never why."""
-    return "good" if comparison.adequate else "warning"
+    """A comparison says where the model fails, and never why; it is good where no more is left than a true model's."""
+    return "good" if comparison.adequate and comparison.is_within_band else "warning"
 
 
 def of_units(found: UnitsCompared) -> Meaning:
@@ -41,7 +41,7 @@ def of_discovery(found: Discovery) -> Meaning:
     """An actuator with a fault, or with another controller or parameters than its file's, is not as it should be."""
     if found.verdict == "adequate":
         other = found.faults or found.parameters_outside_tolerance or found.controller_seen or found.loop_lag
-        return "found" if other else "good"
+        return "found" if other else "good" if found.is_within_band else "warning"
     return "found" if found.verdict == "effects_found" else "warning"
 
 

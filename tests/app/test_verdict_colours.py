@@ -26,10 +26,16 @@ def look(found, assessed=True) -> Any:
     return SimpleNamespace(found=found, assessment=assessment, added=list(found.effects), promising=[])
 
 
-@pytest.mark.parametrize("adequate, meaning", [(True, "good"), (False, "warning")])
-def test_a_comparison_is_green_where_the_model_is_adequate(adequate, meaning):
-    compared = replace(comparison(), adequate=adequate)
-    assert (GREEN in headline(compared)) == adequate and MEANINGS[meaning] in headline(compared)
+@pytest.mark.parametrize(
+    ("adequate", "error", "meaning"), [(True, 1.0, "good"), (True, 1.08, "warning"), (False, 1.0, "warning")]
+)
+def test_a_comparison_is_green_where_the_model_is_adequate_and_within_its_band(adequate, error, meaning):
+    compared = comparison()
+    signals = {
+        name: replace(one, in_floors=replace(one.in_floors, error=error)) for name, one in compared.signals.items()
+    }
+    compared = replace(compared, adequate=adequate, over_floor=error, signals=signals)
+    assert (GREEN in headline(compared)) == (meaning == "good") and MEANINGS[meaning] in headline(compared)
     assert f'class="verdict {meaning}"' in Answer().body(compared, Figures())
 
 

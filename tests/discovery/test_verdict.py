@@ -127,7 +127,7 @@ def test_nothing_is_sure_that_misses_what_was_not_fitted(healthy, unseen, how, a
     story.disagreements = told
     found = result_of(story)
     assert found.at_floor == at_floor and found.verdict == ("adequate" if at_floor else "unknown_effect")
-    assert ("what was not fitted is missed by 4.8 times the floor" in headline(found)) != at_floor
+    assert ("what was not fitted is missed by 4.80 times the floor" in headline(found)) != at_floor
 
 
 def test_what_is_not_claimed_is_told_with_the_reason(healthy):

@@ -44,7 +44,7 @@ def test_it_says_what_was_found(report, comparison):
     for region in comparison.worst_regions:
         assert region.sentence.replace("'", "&#x27;") in text
     error = comparison.signals["current_A"]
-    assert f">{error.rmse:.3f}<" in text and f">{error.rmse / error.noise_floor:.2f}<" in text
+    assert f">{error.rmse:.3f}<" in text and f">{error.in_floors.text}<" in text
     assert "not adequate" in text and "Data health" in text
     assert "+3.00" in text and "Motor inertia stands at the bound" in text
 

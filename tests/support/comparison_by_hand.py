@@ -12,6 +12,7 @@ from scipy.ndimage import uniform_filter1d
 from ema_model.actuator import Actuator, load_actuator
 from ema_model.commands import command
 from ema_model.comparison.explain import Explanation, Order
+from ema_model.comparison.over_floor import OverFloor
 from ema_model.comparison.regions import Region
 from ema_model.comparison.residuals import Residuals, join
 from ema_model.comparison.result import Compared, Comparison, SignalError
@@ -24,6 +25,7 @@ from ema_model.simulation.run import Run, simulate_monitor, simulate_reference
 SIGNALS = ("current_A", "motor_position_rad", "user_position_rad")
 PER_BLOCK = 5
 NOISE_A = 0.45
+BAND = (0.95, 1.05)
 AT_BOUND = "motor.inertia_kgm2"
 
 
@@ -43,8 +45,8 @@ def comparison(
     errors = {name: _over_all(recordings, name) for name in SIGNALS}
     angle, current = residuals.variables["motor_angle"], residuals.values["current_A"]
     return Comparison(
-        over_floor=1.0,
-        floor_band=(0.95, 1.05),
+        over_floor=float(np.sqrt(np.mean([errors[name].in_floors.error ** 2 for name in SIGNALS]))),
+        floor_band=BAND,
         actuator=before,
         calibration=_calibration(before, actuator, recordings) if calibrated else None,
         recordings=recordings,
@@ -113,6 +115,7 @@ def _error(measured: np.ndarray, initial: np.ndarray, model: np.ndarray, sigma: 
         nrmse=_rms(left) / float(np.ptp(measured)),
         noise_floor=_rms(sigma),
         mean_absolute=float(np.mean(np.abs(left))),
+        in_floors=OverFloor(_rms(left / sigma), BAND),
     )
 
 

@@ -45,6 +45,8 @@ class Look:
     found: Discovery
     added: tuple[Added, ...]
     steps: int
+    chi2: float  # of the last model's fit, the prior within it, of which candidates' falls are
+    values: int  # that it is a sum of
     counts: Array  # (blocks,), how much each counts in the ladder's means
     residuals: Residuals
     weights: Sequence[Mapping[str, float]]  # of the fitted signals in each window, over the floor's σ
@@ -92,20 +94,21 @@ class Look:
         return math.sqrt(squared / counted) if counted else self.rmse
 
     def share(self, one: Candidate) -> float:
-        """Of the error, that a candidate would take away, 0 … 1."""
-        return max(0.0, 1.0 - self.predicted_rmse(one) / self.rmse) if self.rmse > 0.0 else 0.0
+        """Of χ², that a candidate is predicted to take away, 0 … 1: what it is ranked by."""
+        return min(1.0, max(0.0, one.predicted_drop / self.chi2)) if self.chi2 > 0.0 else 0.0
 
     def uncertainty(self, one: Candidate) -> float | None:
         """Half of the 90 % interval of the first parameter; None where that is no strength.
 
-        A strength that explains d of χ² is known to 1/√d of itself.
+        A strength that explains d of χ² is known to 1/√d of itself, times what would then be left over the noise.
         """
         if one.name in BY_NAME:
             return None  # a fault is not straight in k: only a fit tells how well it is known
         first = find(one.name, self.found.actuator.axes).parameters[0]
         if first.low > 0.0 or one.predicted_drop <= 0.0:
             return None
-        return HALF_90 * abs(one.settings[first.name]) / math.sqrt(one.predicted_drop)
+        left = max(1.0, (self.chi2 - one.predicted_drop) / max(1, self.values))
+        return HALF_90 * abs(one.settings[first.name]) * math.sqrt(left / one.predicted_drop)
 
     @property
     def removable(self) -> list[str]:
@@ -163,6 +166,8 @@ def look_at(story: Story, found: Discovery, assessment: Assessment | None, first
         found=found,
         added=story.added,
         steps=len(story.steps),
+        chi2=fit.chi2,
+        values=fit.residual.size,
         counts=np.concatenate([one.counts for one in data.floors]),
         residuals=residuals_of(fit.plant, data.told_in, fit.calibration.signals, known, fit.calibration.actuator),
         weights=weights,

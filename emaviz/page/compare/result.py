@@ -16,6 +16,7 @@ from ema_model.comparison.regions import Region, worst_moment
 from ema_model.comparison.result import Compared, Comparison, details, errors, errors_by_recording, of_floor
 from ema_model.errors import InputError
 from ema_model.estimation.calibrate import calibration_table, together
+from ema_model.estimation.floor import BAND_SIGMAS
 from ema_model.faults import HEALTHY
 from ema_model.quantities.variables import VARIABLES
 from ema_model.recordings import Measurement
@@ -37,7 +38,7 @@ from emaviz.text.results import folded, large, of_comparison, shown, warned
 
 # --- a compared recording on the 3D actuator: as measured, the screw glowing where the model fails --------------------
 
-_FULL = 4.0  # times its floor, at which a residual glows fully
+_FULL = 4.0  # times its floor, at which a residual glows fully; it begins where the charts' band ends
 
 
 def motion_of(comparison: Comparison, compared: Compared, actuator: Actuator) -> Motion | None:
@@ -60,11 +61,12 @@ def motion_of(comparison: Comparison, compared: Compared, actuator: Actuator) ->
     )
     shown = motion(run, HEALTHY, actuator)
     name = comparison.primary
-    if name not in compared.measured:
-        return shown
+    if name not in compared.measured or not comparison.worst_regions:
+        return shown  # nothing stands out, and of noise nothing glows
     error = np.abs(compared.measured[name] - compared.model[name]) / compared.sigma[name]
-    glow = np.clip((error - 1.0) / (_FULL - 1.0), 0.0, 1.0)
-    return replace(shown, heat=glow, says=f"Screw red where the model fails (full from {_FULL:g} × floor).")
+    glow = np.clip((error - BAND_SIGMAS) / (_FULL - BAND_SIGMAS), 0.0, 1.0)
+    says = f"Screw red where the model fails (from {BAND_SIGMAS:g} × floor, full from {_FULL:g} ×)."
+    return replace(shown, heat=glow, says=says)
 
 
 # --- the plots of a comparison, in tabs; a chosen region and moment are marked in every one of them -------------------

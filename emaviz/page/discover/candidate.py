@@ -14,14 +14,17 @@ from ema_model.discovery import Candidate
 from ema_model.discovery.steps.snapshot import Look
 from ema_model.discovery.words import effect_title, page_of, size
 from ema_model.discovery.words import typical as typical_fault
+from ema_model.discovery.words import value as as_fitted
 from ema_model.effects import Effect, find
 from ema_model.effects.effect import FAMILIES
 from ema_model.effects.user import UserEffect, user_torque
 from ema_model.effects.user.expression import FUNCTIONS, VARIABLES
 from ema_model.effects.user.torque import RANGE
 from ema_model.errors import InputError
+from ema_model.estimation import Calibrated
+from ema_model.estimation.calibrate import within
 from ema_model.faults import BY_NAME
-from ema_model.quantities.numbers import Quantity, amount, number, with_uncertainty
+from ema_model.quantities.numbers import Quantity, amount, number
 from ema_model.quantities.numbers import number as shown
 from ema_model.quantities.titles import in_sentence
 from ema_model.text import COLOURS
@@ -38,7 +41,6 @@ _CARD = (
     "background-color:rgba(134,142,150,.10)!important;color:inherit!important;"
 )
 _LABEL = "display:block;height:auto;overflow:visible;white-space:pre-line;text-align:left;line-height:1.35;width:100%"
-_LITTLE = 0.005  # of the error
 _BAR = "rgba(240,140,0,.28)"
 
 
@@ -50,11 +52,11 @@ def label(look: Look, one: Candidate) -> str:
     lines = [title]
     if look.is_worth(one):
         before, after = number(look.rmse), number(look.predicted_rmse(one))
-        if look.share(one) < _LITTLE:
+        if before == after:
             lines.append("explains a part, but hardly reduces the error by itself")
         else:
-            lines.append(f"error {before} → ≈ {after} × floor (−{100.0 * look.share(one):.0f} %)")
-        lines += [strength(look, one), confidence(one)]
+            lines.append(f"error {before} → ≈ {after} × floor")
+        lines += [strength(look, one), confidence(look, one)]
         same = look.assessment.alike.get(one.name, ()) if look.assessment else ()
         if same:
             lines.append("≈ same as " + ", ".join(in_sentence(effect_title(name)) for name in same))
@@ -67,15 +69,18 @@ def strength(look: Look, one: Candidate) -> str:
         return size(one, look.found.actuator)
     first = find(one.name, look.found.actuator.axes).parameters[0]
     value, half = one.settings[first.name], look.uncertainty(one)
-    shown = amount(value, first.unit) if half is None else with_uncertainty(value, half, first.unit)
+    shown = amount(value, first.unit)
+    if half is not None:
+        ends, cut = within(value, half, (first.low, first.high))
+        shown = as_fitted(Calibrated(value, value, ends, first.unit, 0.0, False, cut=cut))
     told = f"{in_sentence(first.title)} {shown}"
     order = one.settings.get("order")
     return told if order is None else f"{told}, order {order:g}"
 
 
-def confidence(one: Candidate) -> str:
-    """How strong the evidence is that something like this is missing: 'strong evidence (Δχ² −405)'."""
-    return f"{one.evidence} evidence (Δχ² −{one.predicted_drop:.0f})"
+def confidence(look: Look, one: Candidate) -> str:
+    """How strong the evidence is that something like this is missing: 'strong evidence (Δχ² −405, 62 % of it)'."""
+    return f"{one.evidence} evidence (Δχ² −{one.predicted_drop:.0f}, {100.0 * look.share(one):.0f} % of it)"
 
 
 def style(look: Look | None, shown: Sequence[tuple[str, Candidate | None]], opened: str | None) -> Html:
@@ -250,10 +255,10 @@ def head(look: Look, one: Candidate) -> Html:
         return html("<div {}>No evidence for it: adding it would not reduce the error significantly.</div>", BOX)
     lines: list[str] = [
         html(
-            "The error would fall from <b>{}</b> to about <b>{} times the floor</b> ({:.0f} % of it).",
+            "The error would fall from <b>{}</b> to about <b>{} times the floor</b>: {}.",
             number(look.rmse),
             number(look.predicted_rmse(one)),
-            100.0 * look.share(one),
+            confidence(look, one),
         ),
         f"Suggested: {strength(look, one)} (estimated; adding it fits it).",
     ]

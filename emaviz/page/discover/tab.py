@@ -190,7 +190,7 @@ def step(look: Look | None, running: bool, opened: str | None, revealed: bool) -
     if not look.removable and opened is None:
         return 3, html(
             "Even calibrated, the error is <b>{} times the floor</b>: physics is missing. "
-            "Click the <b>first card</b> below: its bar is the share of the error that it would take away.",
+            "Click the <b>first card</b> below: its bar is the share of the squared error (χ²) that it would remove.",
             number(look.rmse),
         )
     if not look.removable:
@@ -205,9 +205,12 @@ def step(look: Look | None, running: bool, opened: str | None, revealed: bool) -
             "The ladder fell, but not to the floor. Take the step back with <b>Undo</b>, or add the next card."
         )
     if not revealed:
-        return 5, Html(
-            "The ladder on the right has fallen <b>to the floor</b>, on the measurement that was not fitted as well. "
-            "Press <b>Reveal the truth</b> on the right to compare."
+        unseen = look.found.unseen
+        also = ", on the measurement that was not fitted as well" if unseen is not None and not unseen.is_above else ""
+        return 5, html(
+            "The ladder on the right has fallen <b>to the floor</b>{}. "
+            "Press <b>Reveal the truth</b> on the right to compare.",
+            also,
         )
     return 6, Html(
         "That is the whole story: see where a model fails, learn what is missing, add it, watch the error fall. "
@@ -568,7 +571,8 @@ class DiscoverPanel:
         if look.assessment is None:
             return "Analysing the residual and scoring the library's effects and the actuator's faults …"
         if look.promising:
-            return "The bar is the share of the error that it would remove. Click a card to see why, and to add it."
+            bar = "The bar is the share of the squared error (χ²) that it would remove."
+            return f"{bar} Click a card to see why, and to add it."
         if look.assessment.left.explanation is not None and not look.found.at_floor:
             return "No candidate explains the residual: try its curve, or an expression of your own, below."
         return "No candidate would reduce the error significantly."

@@ -11,10 +11,12 @@ from scipy.ndimage import maximum_filter1d, median_filter, uniform_filter1d
 
 from ema_model.actuator import Actuator, Tolerance
 from ema_model.errors import InputError, quoted
+from ema_model.files.opened import listed
 from ema_model.models.loop_window import BLOCK_S, CONTEXT
 from ema_model.models.model import Window
 from ema_model.recordings import Measurement
-from ema_model.recordings.noise import NEAR, WITHIN, sample_noise
+from ema_model.recordings.measurement import ALONG_A_MAP
+from ema_model.recordings.noise import NEAR, WITHIN, sample_noise, scatter_of
 from ema_model.simulation.run import FASTEST_HZ, SLOWEST_HZ, steps_per_sample
 
 # --- signals a little later than they are, by Taylor's series about each sample ---------------------------------------
@@ -271,7 +273,8 @@ def stretches_of(
 
     Raises InputError where there is nothing to compare, or too little motion.
     """
-    measurement.require("motor_position_rad")
+    if not measurement.is_map:
+        measurement.require("motor_position_rad")
     target = next((name for name in ("current_A", "motor_torque_Nm") if name in measurement), None)
     if target is None:
         wanted = f"current_A or {measurement.shown('motor_torque_Nm')}"
@@ -283,13 +286,18 @@ def stretches_of(
     size = 1 if measurement.is_map else max(1, round(actuator.filter_s / _BLOCKS_PER_FILTER / period))
     shaken = None if measurement.is_map else _position_noise(recorded, measurement)
     found = []
-    runs = [slice(0, measurement.samples)] if measurement.is_map else parts or measurement.runs
-    for run in runs:
-        position = measurement["motor_position_rad"][run]
-        blocks = position.size // size
+    if measurement.is_map:
+        load, motions = _load_of_map(measurement, target, actuator), [_steady(measurement)]
+        runs = [slice(0, measurement.samples)]
+    else:
+        load, runs = measurement.get("load_torque_Nm"), parts or measurement.runs
+        motions = None
+    for place, run in enumerate(runs):
+        blocks = (run.stop - run.start) // size
         if blocks < 10:
             continue
-        motion = _standing(position) if measurement.is_map else motion_of(position, period, actuator.filter_s)
+        position = measurement["motor_position_rad"][run] if motions is None else motions[place].position
+        motion = motion_of(position, period, actuator.filter_s) if motions is None else motions[place]
         speed, still, moving = motion.speed, 1e-9, np.arange(blocks)
         if not measurement.is_map:
             steady = actuator.leaves_out_reversals
@@ -298,7 +306,6 @@ def stretches_of(
             moving = _moving(speed, still, motion.kernel.size, size, steady)
         if moving.size < 10:
             continue
-        load = measurement.get("load_torque_Nm")
 
         def means(values: Array, blocks: int = blocks, moving: NDArray[np.intp] = moving) -> Array:
             return values[: blocks * size].reshape(blocks, size).mean(axis=1)[moving]
@@ -321,6 +328,8 @@ def stretches_of(
             "acceleration_rad_s2": means(motion.acceleration),
             **{name: means(measurement[name][run]) for name in CONTEXT if name in measurement},
         }
+        if measurement.is_map and load is not None:
+            context["load_torque_Nm"] = means(load)
         found.append(
             Stretch(
                 name=measurement.name,
@@ -340,7 +349,7 @@ def stretches_of(
                 lasting={target: lasting},
                 allowed={target: allowed},
                 context=context,
-                sensor_noise={target: sample_noise(raw, target) * passed},
+                sensor_noise={target: passed * _noise_of(raw, target, position, motion.speed, load)},
                 passed=passed,
                 alike=1.0 / (size * passed**2),
                 moving=moving,
@@ -356,9 +365,34 @@ def stretches_of(
     return found
 
 
-def _standing(position: Array) -> Motion:
-    zero = np.zeros_like(position)
-    return Motion(position, zero, zero, np.ones(1))
+def _steady(measurement: Measurement) -> Motion:
+    """Of a static map: its angles and its constant speeds, 0 where it has none."""
+    zero = np.zeros(measurement.samples)
+    position, speed = (measurement.get(name, zero) for name in ("motor_position_rad", "motor_speed_rad_s"))
+    return Motion(position, speed, zero, np.ones(1))
+
+
+def _noise_of(raw: Array, target: str, position: Array, speed: Array, load: Array | None) -> float:
+    """White noise of a sample, rms; of a table that goes along speed and torque, what its points scatter by."""
+    is_table = load is not None and len(load) == len(raw) and not np.ptp(position) and np.ptp(load)
+    if not is_table or load is None:
+        return sample_noise(raw, target)
+    return scatter_of(raw, [one for one in (speed, load) if np.ptp(one)], target)
+
+
+def _load_of_map(measurement: Measurement, target: str, actuator: Actuator) -> Array | None:
+    """What each point of a static map bears, N·m at the user: the load, or a torque measured beside the current.
+
+    A dynamometer holds the motor's shaft by the torque that it reads there.  Raises InputError for a map that goes
+    along nothing.
+    """
+    load = measurement.get("load_torque_Nm")
+    if load is None and target == "current_A" and (torque := measurement.get("motor_torque_Nm")) is not None:
+        load = torque / actuator.transmission.gear_ratio
+    if load is None and not any(name in measurement for name in ("motor_position_rad", "motor_speed_rad_s")):
+        along = listed([measurement.shown(name) for name in ALONG_A_MAP])
+        raise InputError(f"{quoted(measurement.name)}: a static map goes along one of {along}; it has none beside")
+    return load
 
 
 def _step_of(position: Array) -> float:

@@ -10,12 +10,12 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from support.benches import Bench
 
 import ema_model as em
 from ema_model.comparison.result import Comparison
 from ema_model.discovery import Discovery
 from ema_model.estimation import Calibrated
+from support.benches import Bench
 
 MOST_FLOORS = 2.0  # of what was held out, up to which a bench counts as represented
 

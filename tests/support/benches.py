@@ -103,7 +103,7 @@ def _integrated(machine: Machine, drive: Drive, goal, ahead, torque_ahead, dt: f
     cascade, servo = drive.kind == "cascade", drive.kind == "position"
     position_gain, limit = drive.position_gain / (n if cascade else 1.0), drive.current_limit
     theta = omega = total = integral = q = v = 0.0
-    if not (drive.kind in ("voltage", "current", "torque")):
+    if drive.kind not in ("voltage", "current", "torque"):
         theta, q = goal[0] / n, goal[0]
     current = 0.0
     samples: tuple[list[float], ...] = ([], [], [], [])
@@ -165,7 +165,9 @@ def waves(random: np.random.Generator, size: float, fastest_Hz: float, slowest_H
     phases = random.uniform(0.0, 2.0 * np.pi, 3)
 
     def moves(time: Array) -> Array:
-        return np.sin(0.5 * np.pi * np.minimum(time / 0.5, 1.0)) ** 2 * (np.sin(np.multiply.outer(time, rates) + phases) @ sizes)
+        return np.sin(0.5 * np.pi * np.minimum(time / 0.5, 1.0)) ** 2 * (
+            np.sin(np.multiply.outer(time, rates) + phases) @ sizes
+        )
 
     return moves
 
@@ -358,7 +360,8 @@ def _cascade(owner: Owner, machine: Machine, tolerance: float = 0.01, user: str 
         constant=owner.told["motor.torque_constant_Nm_A"],
     )
     owner.says("controller", "speed_limit_rad_s = 500.0", f"torque_constant_Nm_A = {drive.constant:.9g}")
-    owner.says("controller", "current_limit_A = 20.0")
+    owner.says("controller", "current_limit_A = 20.0", "derivative_gain_Nms2_rad = 0.0")
+    owner.says("controller", f"integrator_window_{'m' if user == 'linear' else 'rad'} = 10.0")
     owner.says("inverter", 'kind = "current"', "current_limit_A = 20.0")
     return drive
 
@@ -691,7 +694,7 @@ def upright(number: int, owner: Owner) -> Bench:
         machine = _motor(owner, 0.15, kt=kt, inertia=inertia, viscous=owner.near(1.5e-4), dry=dry, gear=gear)
         owner.says("transmission", f"gear_ratio = {gear!r}")
         weight = 9.81 * owner.near(15.0)
-        drive = _cascade(owner, machine)
+        drive = _cascade(owner, machine, user="linear")
         counts = 2.0 * np.pi / 2.0**14
         columns = (
             Column("command_m", "command", "Soll", "mm", 1e3),

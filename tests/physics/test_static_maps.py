@@ -156,9 +156,7 @@ def test_a_map_along_nothing_is_refused(tmp_path):
     bare = Measurement(
         {"time_s": np.arange(200.0), "current_A": np.linspace(0.0, 1.0, 200)}, name="bare", side=SideFile(kind="map")
     )
-    with pytest.raises(
-        InputError, match="bare: a static map goes along one of motor_position_rad, .*motor_speed_rad_s"
-    ):
+    with pytest.raises(InputError, match="bare: a static map goes along one of motor_position_rad"):
         compare([bare], motor(tmp_path))
     few = tmp_path / "few.csv"
     few.write_text("motor_speed_rad_s,current_A\n" + "".join(f"{n},{0.1 * n}\n" for n in range(1, 9)))

@@ -370,7 +370,7 @@ def _of_joint(machine: Machine, random: np.random.Generator, typical: float, *, 
     """Columns of a drive's log: goal, both encoders or the output's alone, current."""
     in_degrees = bool(random.random() < 0.6)
     counts = 2.0 * np.pi / 2.0 ** int(random.integers(13, 17))
-    output = counts * machine.gear * (1.0 if not output_only else 1.0)
+    output = counts * machine.gear
     columns = [
         _angle("command_rad", "command", "Soll", 0.0, in_degrees),
         _angle("user_position_rad", "output", "Ist", output, in_degrees),

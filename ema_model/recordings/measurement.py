@@ -182,7 +182,7 @@ ALONG_A_MAP = ("motor_position_rad", "user_position_rad", "motor_speed_rad_s", "
 def along_map(measurement: Measurement) -> Measurement:
     """A map of steady states with its rows by speed, or else by torque; one along an angle stays as it is.
 
-    Only in order do neighbours tell the noise, and a dynamometer's table goes up and down, or lists points as they came.
+    Only in order do neighbours tell the noise, and a dynamometer's table goes up and down, or lists points anyhow.
     """
     varies = [name for name in ALONG_A_MAP if name in measurement and np.ptp(measurement[name]) > 0.0]
     if not measurement.is_map or not varies or SIGNALS[varies[0]].kind == "position":

@@ -37,6 +37,7 @@ def later(values: Array, late_s: Array, period_s: float, *, smooth: bool = False
 # --- a digital drive answers late: by how much no actuator's file says, so that every comparison looks for it ---------
 
 _DELAY = "computation_delay"
+_SENSORS_DELAY = "sensors.delay_s"
 _SERVO_SAMPLE_S = 2e-3  # of a usual position servo
 
 
@@ -48,6 +49,8 @@ def with_delay_of_drive(actuator: Actuator, measurements: Sequence[Measurement])
     Without it, what the loop loses of its damping is taken for a torque constant or a current sensor that is off.
     As it is where its drive is the three-phase model's, which is not a digital one, or where no drive is simulated.
     """
+    if actuator.controller.kind == "open" and not actuator.takes_voltage:
+        return _with_late_motion(actuator, measurements)
     is_simulated = actuator.controller.kind in ("cascade", "position") or actuator.takes_voltage
     if not is_simulated or actuator.has_reference_model:
         return actuator
@@ -60,6 +63,18 @@ def with_delay_of_drive(actuator: Actuator, measurements: Sequence[Measurement])
         effects={**actuator.effects, _DELAY: {"delay_s": 0.0}},
         tolerances={**actuator.tolerances, f"effects.{_DELAY}.delay_s": late},
     )
+
+
+def _with_late_motion(actuator: Actuator, measurements: Sequence[Measurement]) -> Actuator:
+    """In open loop: a current that was measured is a sample's mean, and one that was asked for holds until the next.
+
+    By which of them, and how long its drive takes, the motion comes later than the model's is not in the log.
+    """
+    free = [path for path, one in actuator.tolerances.items() if one.free]
+    if not free or _SENSORS_DELAY in actuator.tolerances:
+        return actuator
+    late = Tolerance(max(one.sample_period_s for one in measurements), True)
+    return replace(actuator, tolerances={**actuator.tolerances, _SENSORS_DELAY: late})
 
 
 # --- what of a recording's sampling a model can follow ----------------------------------------------------------------

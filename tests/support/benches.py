@@ -64,7 +64,7 @@ class Drive:
     inertia_ahead: float = 0.0  # kg·m² of the goal's acceleration that is fed forward
 
 
-def run(machine: Machine, drive: Drive, command: Moves, rate_Hz: float, duration_s: float) -> dict[str, Array]:
+def simulated(machine: Machine, drive: Drive, command: Moves, rate_Hz: float, duration_s: float) -> dict[str, Array]:
     """What would be seen without noise, at the rate of the log; currents are means over the sample before."""
     substeps = math.ceil(1.0 / (rate_Hz * STEP_S))
     dt = 1.0 / (rate_Hz * substeps)
@@ -227,7 +227,7 @@ class Column:
     """How one signal is logged."""
 
     signal: str  # as the product calls it
-    source: str  # of `run`
+    source: str  # of `simulated`
     name: str  # in the file
     unit: str
     factor: float  # the file's number per SI
@@ -271,7 +271,7 @@ class Bench:
         paths = []
         for number, command in enumerate(self.commands):
             random = np.random.default_rng([self.seed, number])
-            seen = run(self.machine, self.drive, command, self.rate_Hz, self.duration_s)
+            seen = simulated(self.machine, self.drive, command, self.rate_Hz, self.duration_s)
             table = {"Zeit": seen["time"]}
             for one in self.columns:
                 values = seen[one.source] + one.noise * random.standard_normal(seen["time"].size)

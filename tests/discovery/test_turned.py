@@ -13,7 +13,6 @@ from ema_model.discovery import Discovery, discover
 from ema_model.recordings import Measurement
 from ema_model.recordings.side_file import SideFile
 
-
 AMONG = ("cogging_torque", "torque_ripple", "hinge_moment", "friction_zone")
 
 

@@ -23,7 +23,7 @@ Array = NDArray[np.float64]
 Moves = Callable[[Array], Array]
 
 BEFORE_S = 0.5  # that a drive has held its first goal for, when the log begins
-STEP_S = 5e-5  # of the integration and of the drive's own loop, at most
+STEP_S = 2.5e-5  # of the integration and of the drive's own loop, at most
 
 
 @dataclass(frozen=True)
@@ -74,7 +74,9 @@ def simulated(machine: Machine, drive: Drive, command: Moves, rate_Hz: float, du
     at = dt * np.arange(-before * substeps - 2, count * substeps) - drive.late
     if is_open:  # held from sample to sample
         at = np.floor(at * rate_Hz + 1e-6) / rate_Hz
-    goal = drive.scale * command(np.maximum(at, 0.0))
+    # A bus brings a goal with each sample, between which the drive goes straight.
+    ticks = np.arange(count + 1) / rate_Hz
+    goal = drive.scale * (command(np.maximum(at, 0.0)) if is_open else np.interp(at, ticks, command(ticks)))
     if math.isfinite(drive.rate):
         goal = _no_faster(goal, drive.rate * dt)
     rise = np.gradient(goal, dt)

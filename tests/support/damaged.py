@@ -153,10 +153,12 @@ def in_groups(reader: str, folder: Path) -> list[bytes]:
 
 
 def npy_arrays() -> list[bytes]:
-    """A matrix with a column for each signal, on its side too, whole numbers, and a table in Fortran's order."""
-    table = np.column_stack(list(COLUMNS.values()))
-    forms = (table, table.T, np.round(100.0 * table).astype(np.int16), np.asfortranarray(table.astype(np.float32)))
-    return [written(np.save, one) for one in forms]
+    """Tables of other numbers: short floats, whole ones beside a time, and a column of records."""
+    short = [("time_s", "f8"), *((name, "f4") for name in COLUMNS if name != "time_s")]
+    whole_numbers = [("time_s", "f8"), ("current_A", "i2"), ("duty", "u1"), ("note", "S3")]
+    tables = (TABLE.astype(short), np.zeros(N, whole_numbers), TABLE.reshape(N, 1))
+    tables[1]["time_s"], tables[1]["current_A"] = COLUMNS["time_s"], np.round(100.0 * COLUMNS["current_A"])
+    return [written(np.save, np.asarray(one)) for one in tables]
 
 
 def as_mat73(content: bytes, folder: Path) -> bytes:

@@ -31,7 +31,7 @@ TABLES: dict[str, dict[str, str]] = {
     "recordings.where": {
         "match": 'pattern of file names without their ending, such as "*kp100*"',
         "set": 'table of "section.parameter" = value that hold for these recordings',
-        "kind": "run, or map for a static map: current or torque against angle, without time",
+        "kind": "run, or map for a static map, without time: current or torque against angle, speed or load",
     },
 }
 KINDS = {

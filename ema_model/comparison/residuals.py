@@ -201,12 +201,17 @@ def _variables(window: Window, signals: dict[str, Array], actuator: Actuator, st
     if window.command is None:
         angle, speed = window.context["motor_position_rad"], window.context["motor_speed_rad_s"]
         acceleration = window.context["acceleration_rad_s2"]
-        moves = bool(np.any(speed))
-        variables = {} if actuator.axes.motor == "linear" else {"motor_angle": angle}
-        if actuator.axes.motor == "linear" or tau != 1.0:
-            variables["user_position"] = tau * angle
-        if moves:
-            variables |= {"motor_speed": speed, "acceleration": acceleration, "time": window.time_s - start_s}
+        variables: dict[str, Array] = {}
+        is_in_time = bool(np.any(acceleration))  # and no static map
+        if is_in_time or np.any(angle):
+            variables = {} if actuator.axes.motor == "linear" else {"motor_angle": angle}
+            if actuator.axes.motor == "linear" or tau != 1.0:
+                variables["user_position"] = tau * angle
+        if np.any(speed):
+            variables["motor_speed"] = speed
+        if is_in_time:
+            variables |= {"acceleration": acceleration, "time": window.time_s - start_s}
+        if np.any(speed) or "load_torque_Nm" in window.context:
             variables["current"] = signals["current_A"]
         user = tau * angle
     else:

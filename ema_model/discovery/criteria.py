@@ -106,6 +106,10 @@ HEARD, GONE = 2.0, 0.3
 # of that, what a sign, a zero or a unit put right must come down to.
 MISSED, PUT_RIGHT = 3.0, 0.4
 
+# Of what an effect changes by its square, that must be gone from the error of a held-out recording whose encoder is put
+# right: at another turn than the true one it would add as much.
+SHARED = 0.5
+
 # Tolerances of the file, by which a parameter must differ before a recording counts as another actuator's; and how much
 # wider than them is looked.
 ANOTHER, WIDER = 3.0, 4.0

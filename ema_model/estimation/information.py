@@ -24,6 +24,8 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 _WEAK = 0.05  # σ of its prior, that a direction must be left open by to be simulated: less is known well either way
+_WIDEST = 2  # directions, that are simulated however little they seem to be left open
+_STRAIGHT = 3.0  # floors, that the signals may change by over a step along one unknown
 _ROUNDS = 12  # of measurements: what was false information leaves its direction wider open than was seen before
 _ROOM = 0.02  # of the longest way, that one must be long within the bounds to tell anything
 _GROWN = 1.05  # times as wide open, from which on a direction is measured again
@@ -71,15 +73,19 @@ def measured(problem: Problem, x: Array, jacobian: Array, scale: float = 1.0) ->
     jacobian: by the problem's own steps, with its prior's rows below; scale: by which what the model misses widens the
     covariance.  A direction is an eigenvector of the covariance; positive quantities are moved along it by ratios.
     """
-    found, before = jacobian, np.zeros(problem.count)
-    for _ in range(_ROUNDS):
+    found, before = _over_short_steps(problem, x, jacobian), np.zeros(problem.count)
+    for turn in range(_ROUNDS):
         variances, directions = np.linalg.eigh(covariance_of(found))
-        open_by = np.sqrt(np.minimum(1.0, scale * variances))
+        open_by = np.sqrt(np.clip(scale * variances, 0.0, 1.0))  # rounding may leave one below 0
         weak = open_by > _WEAK
-        if not (open_by > _GROWN * np.maximum(before, _WEAK)).any():
+        if turn == 0:  # what is left of truncation may hide the widest
+            weak[-_WIDEST:] = True
+        if turn > 0 and not (open_by > _GROWN * np.maximum(before, _WEAK)).any():
+            break
+        if not weak.any():
             break
         before = open_by
-        steps = open_by[weak, None] * directions[:, weak].T
+        steps = np.maximum(open_by, _WEAK)[weak, None] * directions[:, weak].T
         at = np.broadcast_to(x, steps.shape)
         ends = [problem.clip(problem.moved(at, sign * steps)) for sign in (-1.0, 1.0)]
         ways = problem.distance(at, *ends)
@@ -92,8 +98,32 @@ def measured(problem: Problem, x: Array, jacobian: Array, scale: float = 1.0) ->
     return found
 
 
+def _over_short_steps(problem: Problem, x: Array, jacobian: Array) -> Array:
+    """The derivatives, of unknowns by whose steps the signals change far beyond their floors over shorter ones.
+
+    There the steps are beyond what is straight, and the columns do not cancel along a direction that changes nothing:
+    the position of a motor in open loop moves by radians with a hundredth of its torque.
+    """
+    values = problem.values
+    far = problem.steps * np.sqrt(np.mean(np.square(jacobian[:values]), axis=0)) / _STRAIGHT
+    columns = np.flatnonzero(far > 1.0)
+    if not columns.size:
+        return jacobian
+    by = np.zeros((columns.size, problem.count))
+    by[np.arange(columns.size), columns] = (problem.steps / np.maximum(far, 1.0))[columns]
+    at = np.broadcast_to(x, by.shape)
+    ends = [problem.clip(problem.moved(at, sign * by)) for sign in (-1.0, 1.0)]
+    ways = problem.distance(at, *ends)[np.arange(columns.size), columns]
+    below, above = np.split(problem.residuals(np.concatenate(ends)), 2)
+    found = jacobian.copy()
+    room = ways > 0.0
+    found[:values, columns[room]] = ((above - below)[room, :values] / ways[room, None]).T
+    return found
+
+
 # --- what is known only together: products of powers that recordings tell, though none of their factors ---------------
 
+_ROUNDING = 1e-15  # of the greatest variance
 _BY_OTHERS = 3.0  # how many times wider open a factor must be than if all others were known
 _KNOWN = 0.2  # of what its factors leave each on its own, that a product may be left open by
 _POWERS = {
@@ -126,7 +156,9 @@ def known_together(names: Sequence[str], values: Array, sigmas: Array, covarianc
     """
     shares = sigmas / values
     logarithms = covariance * np.outer(shares, shares)
-    taken_up = np.sqrt(np.diag(covariance) * np.diag(np.linalg.inv(covariance)))
+    variances, directions = np.linalg.eigh(covariance)
+    variances = np.maximum(variances, _ROUNDING * variances[-1:])  # one that is known to rounding may be below 0
+    taken_up = np.sqrt(np.diag(covariance) * np.sum(directions**2 / variances, axis=1))
     order = np.argsort(-taken_up, kind="stable")[:_MOST_OPEN]
     open_ones = sorted(int(i) for i in order if taken_up[i] > _BY_OTHERS)
     found: list[tuple[Array, Combination]] = []

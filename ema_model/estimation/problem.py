@@ -298,6 +298,11 @@ class Problem:
         """Takes base parameters to be within `spread` of their tolerances: of all, or of each (base parameters,)."""
         self.prior[self.base] = 1.0 / np.maximum(spread, _EXACT)
 
+    @property
+    def steps(self) -> Array:
+        """Of the differences that derivatives are taken by, σ, (unknowns,)."""
+        return self._step
+
     def residuals(self, x: Array) -> Array:
         """(n, unknowns) → (n, values + unknowns)."""
         errors = windows(lambda window: self._errors(x, window), range(len(self.weights)))

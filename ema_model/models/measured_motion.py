@@ -11,10 +11,12 @@ from scipy.ndimage import maximum_filter1d, median_filter, uniform_filter1d
 
 from ema_model.actuator import Actuator, Tolerance
 from ema_model.errors import InputError, quoted
+from ema_model.files.opened import listed
 from ema_model.models.loop_window import BLOCK_S, CONTEXT
 from ema_model.models.model import Window
 from ema_model.recordings import Measurement
-from ema_model.recordings.noise import NEAR, WITHIN, sample_noise
+from ema_model.recordings.measurement import ALONG_A_MAP
+from ema_model.recordings.noise import NEAR, WITHIN, sample_noise, scatter_of
 from ema_model.simulation.run import FASTEST_HZ, SLOWEST_HZ, steps_per_sample
 
 # --- signals a little later than they are, by Taylor's series about each sample ---------------------------------------
@@ -35,6 +37,7 @@ def later(values: Array, late_s: Array, period_s: float, *, smooth: bool = False
 # --- a digital drive answers late: by how much no actuator's file says, so that every comparison looks for it ---------
 
 _DELAY = "computation_delay"
+_SENSORS_DELAY = "sensors.delay_s"
 _SERVO_SAMPLE_S = 2e-3  # of a usual position servo
 
 
@@ -46,6 +49,8 @@ def with_delay_of_drive(actuator: Actuator, measurements: Sequence[Measurement])
     Without it, what the loop loses of its damping is taken for a torque constant or a current sensor that is off.
     As it is where its drive is the three-phase model's, which is not a digital one, or where no drive is simulated.
     """
+    if actuator.controller.kind == "open" and not actuator.takes_voltage:
+        return _with_late_motion(actuator, measurements)
     is_simulated = actuator.controller.kind in ("cascade", "position") or actuator.takes_voltage
     if not is_simulated or actuator.has_reference_model:
         return actuator
@@ -58,6 +63,18 @@ def with_delay_of_drive(actuator: Actuator, measurements: Sequence[Measurement])
         effects={**actuator.effects, _DELAY: {"delay_s": 0.0}},
         tolerances={**actuator.tolerances, f"effects.{_DELAY}.delay_s": late},
     )
+
+
+def _with_late_motion(actuator: Actuator, measurements: Sequence[Measurement]) -> Actuator:
+    """In open loop: a current that was measured is a sample's mean, and one that was asked for holds until the next.
+
+    By which of them, and how long its drive takes, the motion comes later than the model's is not in the log.
+    """
+    free = [path for path, one in actuator.tolerances.items() if one.free]
+    if not free or _SENSORS_DELAY in actuator.tolerances:
+        return actuator
+    late = Tolerance(max(one.sample_period_s for one in measurements), True)
+    return replace(actuator, tolerances={**actuator.tolerances, _SENSORS_DELAY: late})
 
 
 # --- what of a recording's sampling a model can follow ----------------------------------------------------------------
@@ -271,7 +288,8 @@ def stretches_of(
 
     Raises InputError where there is nothing to compare, or too little motion.
     """
-    measurement.require("motor_position_rad")
+    if not measurement.is_map:
+        measurement.require("motor_position_rad")
     target = next((name for name in ("current_A", "motor_torque_Nm") if name in measurement), None)
     if target is None:
         wanted = f"current_A or {measurement.shown('motor_torque_Nm')}"
@@ -283,13 +301,18 @@ def stretches_of(
     size = 1 if measurement.is_map else max(1, round(actuator.filter_s / _BLOCKS_PER_FILTER / period))
     shaken = None if measurement.is_map else _position_noise(recorded, measurement)
     found = []
-    runs = [slice(0, measurement.samples)] if measurement.is_map else parts or measurement.runs
-    for run in runs:
-        position = measurement["motor_position_rad"][run]
-        blocks = position.size // size
+    if measurement.is_map:
+        load, motions = _load_of_map(measurement, target, actuator), [_steady(measurement)]
+        runs = [slice(0, measurement.samples)]
+    else:
+        load, runs = measurement.get("load_torque_Nm"), parts or measurement.runs
+        motions = None
+    for place, run in enumerate(runs):
+        blocks = (run.stop - run.start) // size
         if blocks < 10:
             continue
-        motion = _standing(position) if measurement.is_map else motion_of(position, period, actuator.filter_s)
+        position = measurement["motor_position_rad"][run] if motions is None else motions[place].position
+        motion = motion_of(position, period, actuator.filter_s) if motions is None else motions[place]
         speed, still, moving = motion.speed, 1e-9, np.arange(blocks)
         if not measurement.is_map:
             steady = actuator.leaves_out_reversals
@@ -298,7 +321,6 @@ def stretches_of(
             moving = _moving(speed, still, motion.kernel.size, size, steady)
         if moving.size < 10:
             continue
-        load = measurement.get("load_torque_Nm")
 
         def means(values: Array, blocks: int = blocks, moving: NDArray[np.intp] = moving) -> Array:
             return values[: blocks * size].reshape(blocks, size).mean(axis=1)[moving]
@@ -321,6 +343,8 @@ def stretches_of(
             "acceleration_rad_s2": means(motion.acceleration),
             **{name: means(measurement[name][run]) for name in CONTEXT if name in measurement},
         }
+        if measurement.is_map and load is not None:
+            context["load_torque_Nm"] = means(load)
         found.append(
             Stretch(
                 name=measurement.name,
@@ -340,7 +364,7 @@ def stretches_of(
                 lasting={target: lasting},
                 allowed={target: allowed},
                 context=context,
-                sensor_noise={target: sample_noise(raw, target) * passed},
+                sensor_noise={target: passed * _noise_of(raw, target, position, motion.speed, load)},
                 passed=passed,
                 alike=1.0 / (size * passed**2),
                 moving=moving,
@@ -356,9 +380,34 @@ def stretches_of(
     return found
 
 
-def _standing(position: Array) -> Motion:
-    zero = np.zeros_like(position)
-    return Motion(position, zero, zero, np.ones(1))
+def _steady(measurement: Measurement) -> Motion:
+    """Of a static map: its angles and its constant speeds, 0 where it has none."""
+    zero = np.zeros(measurement.samples)
+    position, speed = (measurement.get(name, zero) for name in ("motor_position_rad", "motor_speed_rad_s"))
+    return Motion(position, speed, zero, np.ones(1))
+
+
+def _noise_of(raw: Array, target: str, position: Array, speed: Array, load: Array | None) -> float:
+    """White noise of a sample, rms; of a table that goes along speed and torque, what its points scatter by."""
+    is_table = load is not None and len(load) == len(raw) and not np.ptp(position) and np.ptp(load)
+    if not is_table or load is None:
+        return sample_noise(raw, target)
+    return scatter_of(raw, [one for one in (speed, load) if np.ptp(one)], target)
+
+
+def _load_of_map(measurement: Measurement, target: str, actuator: Actuator) -> Array | None:
+    """What each point of a static map bears, N·m at the user: the load, or a torque measured beside the current.
+
+    A dynamometer holds the motor's shaft by the torque that it reads there.  Raises InputError for a map that goes
+    along nothing.
+    """
+    load = measurement.get("load_torque_Nm")
+    if load is None and target == "current_A" and (torque := measurement.get("motor_torque_Nm")) is not None:
+        load = torque / actuator.transmission.gear_ratio
+    if load is None and not any(name in measurement for name in ("motor_position_rad", "motor_speed_rad_s")):
+        along = listed([measurement.shown(name) for name in ALONG_A_MAP])
+        raise InputError(f"{quoted(measurement.name)}: a static map goes along one of {along}; it has none beside")
+    return load
 
 
 def _step_of(position: Array) -> float:

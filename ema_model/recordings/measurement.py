@@ -175,6 +175,25 @@ def gear_in_words(gear_ratio: float, axes: Axes) -> str:
     return f"the ratio of {gear_ratio:.6g} {axes.unit('', USER, per=MOTOR)}"
 
 
+# What a static map goes along, by the names inside: an angle, or the steady states of a dynamometer's table.
+ALONG_A_MAP = ("motor_position_rad", "user_position_rad", "motor_speed_rad_s", "load_torque_Nm", "motor_torque_Nm")
+
+
+def along_map(measurement: Measurement) -> Measurement:
+    """A map of steady states with its rows by speed, or else by torque; one along an angle stays as it is.
+
+    Only in order do neighbours tell the noise, and a dynamometer's table goes up and down, or lists points anyhow.
+    """
+    varies = [name for name in ALONG_A_MAP if name in measurement and np.ptp(measurement[name]) > 0.0]
+    if not measurement.is_map or not varies or SIGNALS[varies[0]].kind == "position":
+        return measurement
+    order = np.argsort(measurement[varies[0]], kind="stable")
+    if np.array_equal(order, np.arange(order.size)):
+        return measurement
+    signals = {name: values[order] for name, values in measurement.signals.items() if name != "time_s"}
+    return replace(measurement, signals={"time_s": np.arange(float(order.size)), **signals})
+
+
 # --- signals of one run on a common time base -------------------------------------------------------------------------
 
 Default = TypeVar("Default")
@@ -295,7 +314,7 @@ class Measurement(InWords):
 
     @property
     def is_map(self) -> bool:
-        """Whether it is a static map, current or torque against angle; its time only counts the samples."""
+        """Whether it is a static map, current or torque against `ALONG_A_MAP`; its time only counts the samples."""
         return self.side.kind == "map"
 
     def with_notes(self, *notes: str) -> Measurement:

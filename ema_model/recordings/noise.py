@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from itertools import pairwise
@@ -32,6 +33,9 @@ _MORE, _AT_MOST = 1.05, 1.12  # of a grid's noise: what differences tell of it i
 NEAR, WITHIN = 3.0, 0.9866  # standard deviations, and the rms of a normal distribution's values within them
 
 
+_LEAST_LEFT = 0.1  # of a point's variance, that its neighbours leave, to tell the noise
+
+
 def sample_noise(values: Array, signal: str) -> float:
     """White noise and quantisation of a signal (samples,), rms.
 
@@ -41,6 +45,29 @@ def sample_noise(values: Array, signal: str) -> float:
     counted in.
     """
     return max(_own_noise(np.asarray(values, dtype=float).tobytes())[0], least_noise(signal))
+
+
+def scatter_of(values: Array, along: Sequence[Array], signal: str) -> float:
+    """White noise of the points of a table, (points,), about surfaces of second order through their neighbours, rms.
+
+    along: what the table goes along, (points,) each; neighbours have the same signs of all of it, since friction turns
+    with the motion.  In a table there is no order in time by whose differences the noise would show.
+    """
+    scaled = np.stack([one / (np.ptp(one) or 1.0) for one in along], axis=1)
+    count = 4 * len(along) + 3
+    signs = np.sign(np.stack(along, axis=1))
+    off = []
+    for at in range(len(values)):
+        like = np.flatnonzero(np.all(signs == signs[at], axis=1))
+        near = like[np.argsort(np.sum((scaled[like] - scaled[at]) ** 2, axis=1), kind="stable")[:count]]
+        away = scaled[near] - scaled[at]
+        columns = np.concatenate([np.ones((near.size, 1)), away, away**2], axis=1)
+        own = np.linalg.pinv(columns, rcond=1e-6)[0]  # what each neighbour counts in the surface at the point itself
+        left = 1.0 - own[0]
+        if left > _LEAST_LEFT:
+            off.append((values[at] - own @ values[near]) / np.sqrt(left))
+    scatter = 1.4826 * float(np.median(np.abs(off))) if off else 0.0
+    return max(scatter, least_noise(signal))
 
 
 def is_of_grid(values: Array) -> bool:

@@ -36,8 +36,10 @@ from ema_model.recordings.formats import Format, format_of
 from ema_model.recordings.formats.clocks import Clocks
 from ema_model.recordings.formats.text_layout import Head, Hints, by_number
 from ema_model.recordings.measurement import (
+    ALONG_A_MAP,
     PHASES,
     Measurement,
+    along_map,
     with_current,
     with_motor_side,
     with_third_phase,
@@ -90,7 +92,7 @@ def read_measurement(
             looked_at=isinstance(mapping, ColumnMapping),
         )
         columns = file_format.read(path, known, max_bytes, True)
-        check_length(path, next(iter(columns.arrays.values())).size)
+        check_length(path, next(iter(columns.arrays.values())).size, side.kind)
         check_finite(path, columns.arrays, columns.place)
         signals, done = apply_mapping(columns.arrays, used)
         columns.arrays.clear()  # they are copied, and large; Arrow would keep their memory for later
@@ -108,13 +110,13 @@ def read_measurement(
     clocks = columns.clocks and _of_signals(columns.clocks, used)
     measurement = replace(bare, name=name, reading=Reading(clocks=clocks, layout=columns.layout))
     measurement = without_delays(unwrapped(path, measurement, used), used)
-    check_length(path, measurement.samples)
+    check_length(path, measurement.samples, side.kind)
     if side.window_s is not None or side.segments is not None:
         try:
             measurement = measurement.selected(side.window_s, side.segments)
         except InputError as error:
             raise refusal(path, str(error).removeprefix(f"{shown(measurement.name, 100)}: ")) from None
-        check_length(path, measurement.samples)
+        check_length(path, measurement.samples, side.kind)
     return measurement
 
 
@@ -257,6 +259,8 @@ def _measurement(
 Place = Callable[[int], str]
 
 FEWEST_SAMPLES = 100
+FEWEST_ROWS = 12  # of a static map
+_LONGER = "record for longer or faster"
 _MOST_HZ = 1e9
 LARGEST = 1e30  # absolute value, in any unit
 _SHORTEST_STEP_S = 1e-12
@@ -361,11 +365,12 @@ def check_finite(path: str, arrays: Mapping[str, Array], place: Place) -> None:
             raise refusal(path, f"{place(row)}, column {quoted(name)!r}: {problem}")
 
 
-def check_length(path: str, samples: int) -> None:
-    """Raises TooShort for fewer samples than a fit can use."""
-    if samples < FEWEST_SAMPLES:
+def check_length(path: str, samples: int, kind: str = "run") -> None:
+    """Raises TooShort for fewer samples than a fit can use; kind: of the recording, as in side files."""
+    fewest, advice = (FEWEST_ROWS, "measure at more points") if kind == "map" else (FEWEST_SAMPLES, _LONGER)
+    if samples < fewest:
         found = f"{samples} sample{'s' * (samples != 1)}"
-        line = refusal(path, f"has {found}; {FEWEST_SAMPLES} or more are expected, record for longer or faster")
+        line = refusal(path, f"has {found}; {fewest} or more are expected, {advice}")
         raise TooShort(str(line))
 
 
@@ -399,7 +404,7 @@ def prepared(measurement: Measurement, actuator: Actuator) -> Measurement:
     inside = replace(measurement, signals=axes.inside(measurement.signals), axes=axes, of_other_axes=others)
     if others:
         inside = inside.with_notes(f"left aside, as the actuator's axes are of another kind: {listed(others)}")
-    known = _with_other_side(inside, actuator)
+    known = along_map(_with_other_side(inside, actuator))
     made = with_current(known, actuator.motor.pole_pairs, actuator.motor.rotor_offset_rad)
     if made is inside:
         return made
@@ -413,7 +418,7 @@ def _with_other_side(inside: Measurement, actuator: Actuator) -> Measurement:
     """What the actuator's model needs and was not recorded, of what was: the motor's motion, and the third phase."""
     ratio, between = actuator.transmission.gear_ratio, _between(actuator)
     needs_current = "current_A" not in inside and sum(name in inside for name in PHASES) > 1
-    if actuator.controller.kind == "unknown" or needs_current:
+    if actuator.controller.kind == "unknown" or inside.is_map or needs_current:
         made = with_motor_side(inside, ratio, between)
     else:  # a loop has the user's position, which the motor's would only repeat; its speed tells more
         made = inside if between else with_motor_side(inside, ratio, speed_only=True)
@@ -552,7 +557,7 @@ def signals_in(
 def needed(actuator: Actuator, *, is_map: bool = False) -> Needs:
     """The groups of signals of each of which the actuator's model needs one; names inside."""
     if is_map:
-        return (_POSITIONS, ("current_A", "motor_torque_Nm"))
+        return (ALONG_A_MAP, ("current_A", "motor_torque_Nm"))
     if actuator.controller.kind == "unknown":
         return (("time_s",), _POSITIONS, ("current_A", "motor_torque_Nm"))
     if actuator.controller.kind == "open":

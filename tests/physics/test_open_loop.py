@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from support.benches import Drive, Machine, simulated, waves
 
 from ema_model.actuator import load_actuator
 from ema_model.commands import command
@@ -95,3 +96,32 @@ def test_command_line(tmp_path, capsys):
     )
     assert main(["simulate", "--input", "absent.csv", "--out", str(tmp_path / "b.csv")]) == 2
     assert "absent.csv: no such file" in capsys.readouterr().err
+
+
+DRIVEN = """
+[controller]
+kind = "open"
+[motor]
+torque_constant_Nm_A = { value = 0.1, tolerance = 0.03 }
+inertia_kgm2 = { value = 1.5e-4, tolerance = 0.15 }
+viscous_friction_Nms_rad = { value = 1.5e-4, tolerance = 0.3 }
+static_friction_Nm = 0.02
+dynamic_friction_Nm = { value = 0.03, tolerance = 0.15 }
+"""
+
+
+def test_a_current_that_holds_until_the_next_comes_late_and_its_scale_stays_open(tmp_path):
+    """All torques over the inertia are told and none of them alone: a constant that is known by 3 % stays so."""
+    (tmp_path / "motor.toml").write_text(DRIVEN, encoding="utf-8")
+    motor = Machine(torque_constant=0.104, inertia=1.45e-4, viscous=1.7e-4, dry=0.031)
+    seen = simulated(motor, Drive("current"), waves(np.random.default_rng(4), 1.1, 6.0, 0.6), 1000.0, 2.5)
+    position = np.round(seen["motor"] / 4e-4) * 4e-4
+    log = Measurement({"time_s": seen["time"], "current_A": seen["command"], "motor_position_rad": position}, "log")
+    found = compare([log], load_actuator(tmp_path / "motor.toml"))
+    assert found.adequate and found.calibration is not None
+    told = found.calibration.parameters
+    assert told["sensors.delay_s"].value == pytest.approx(0.9e-3, abs=0.3e-3)
+    low, high = told["motor.torque_constant_Nm_A"].interval90
+    assert low < motor.torque_constant < high and high - low > 0.06 * motor.torque_constant
+    ratio = told["motor.torque_constant_Nm_A"].value / told["motor.inertia_kgm2"].value
+    assert ratio == pytest.approx(motor.torque_constant / motor.inertia, rel=0.01)

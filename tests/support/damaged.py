@@ -152,6 +152,27 @@ def in_groups(reader: str, folder: Path) -> list[bytes]:
     return found
 
 
+def npy_arrays() -> list[bytes]:
+    """Tables of other numbers: short floats, whole ones beside a time, and a column of records."""
+    short = [("time_s", "f8"), *((name, "f4") for name in COLUMNS if name != "time_s")]
+    whole_numbers = [("time_s", "f8"), ("current_A", "i2"), ("duty", "u1"), ("note", "S3")]
+    tables = (TABLE.astype(short), np.zeros(N, whole_numbers), TABLE.reshape(N, 1))
+    tables[1]["time_s"], tables[1]["current_A"] = COLUMNS["time_s"], np.round(100.0 * COLUMNS["current_A"])
+    return [written(np.save, np.asarray(one)) for one in tables]
+
+
+def as_mat73(content: bytes, folder: Path) -> bytes:
+    """An HDF5 file's objects behind MATLAB's header."""
+    plain, path = folder / "plain.h5", folder / "behind.mat"
+    plain.write_bytes(content)
+    with h5py.File(plain, "r") as file, h5py.File(path, "w", userblock_size=512) as behind:
+        for name in file:
+            file.copy(name, behind)
+    with path.open("r+b") as file:
+        file.write(b"MATLAB 7.3 MAT-file, Platform: GLNXA64".ljust(124) + b"\0\2IM")
+    return path.read_bytes()
+
+
 def dspace(folder: Path) -> bytes:
     fast = k / 1e3, {"motor_position_rad": ("", COLUMNS["motor_position_rad"])}
     write_dspace(folder / "whole.mat", {"Fast": fast, "Slow": (SLOW, {"current_A": ("", np.sin(SLOW))})})
@@ -196,7 +217,10 @@ def whole(reader: str, folder: Path) -> list[bytes]:
     if reader in FILES:
         ending, write = FILES[reader]
         write(folder / f"whole{ending}", COLUMNS)
-        return [(folder / f"whole{ending}").read_bytes(), *in_groups(reader, folder)]
+        found = [(folder / f"whole{ending}").read_bytes(), *in_groups(reader, folder)]
+        if reader == "mat 7.3":
+            found += [as_mat73(one, folder) for one in in_groups("hdf5", folder)]
+        return [*found, *npy_arrays()] if reader == "npy" else found
     if reader == "side file":
         return [SIDE.encode()]
     if reader == "actuator":

@@ -52,7 +52,7 @@ def contradictions(story: Story, tell: Callable[[str], None]) -> list[Contradict
         return []
     found, limit = [], MISSED * max(1.0, ratio(story.data, story.current))
     for place, measurement in enumerate(story.held.measurements):
-        alone = _alone(story.held, story.current, place)
+        alone = alone_of(story.held, story.current, place)
         if alone is None:
             continue
         before = resimulated(alone, story.current.calibration.actuator)[0]
@@ -166,7 +166,7 @@ def _another(story: Story, alone: Data) -> tuple[float, list[str]]:
     return after, others
 
 
-def _alone(held: Data, found: Fit, place: int) -> Data | None:
+def alone_of(held: Data, found: Fit, place: int) -> Data | None:
     """One of the held-out recordings."""
     windows = held.plant(found.calibration.actuator).windows
     floors = [one for window, one in zip(windows, held.floors) if window.recording == place]

@@ -60,6 +60,7 @@ class Story:
     transmission_seen: TransmissionSeen | None = None  # where the user's position leaves the motor's
     two_masses_seen: TwoMasses | None = None  # where a second mass swings on the motor's and no model holds it
     disagreements: list[Contradiction] = field(default_factory=list)  # of held-out recordings
+    turned: list[Contradiction] = field(default_factory=list)  # the same of those whose encoder was put right
     _calm: dict[Fit, Fit] = field(default_factory=dict)  # fits by those that they were settled from
     _prints: list[Fingerprint] = field(default_factory=list)
 
@@ -283,9 +284,16 @@ class Story:
         """The number of steps before the first effect: the calibrated model, and its faults."""
         return next((i for i, step in enumerate(self.steps) if step.added), len(self.steps))
 
+    def hold_out(self, held: Data) -> None:
+        """Held-out recordings as they are read from now on; all steps are told in their errors."""
+        self.held = held
+        told = (self._rung(one.rung.change, one.fit) for one in self.steps)
+        self.steps = [replace(one, rung=rung) for one, rung in zip(self.steps, told)]
+
     def take_over(self, other: Story) -> None:
         """Goes on as another story of the same recordings, by another model; its warnings come last."""
         self.data, self.held, self.steps = other.data, other.held, other.steps
+        self.turned = other.turned
         self.ties, self._calm, self._prints = other.ties, other._calm, other._prints
         self.refused = {**self.refused, **other.refused}
         self.warnings += other.warnings

@@ -23,6 +23,7 @@ from ema_model.discovery.steps.dropped import drop_doubtful, drop_idle
 from ema_model.discovery.steps.path import Story
 from ema_model.discovery.steps.ranking import with_faults
 from ema_model.discovery.steps.second_opinion import Opinion, compared, second_opinion, taken_over
+from ema_model.discovery.steps.turned import put_right
 from ema_model.discovery.steps.weighed_again import fault_instead, near, weigh_again
 from ema_model.effects import CATALOGUE, find
 from ema_model.estimation.model_fit import Fit
@@ -53,9 +54,10 @@ def walk(
     own = _Walk(story, tell, candidates, most_effects)
     beside = _Beside(story, tell, candidates, most_effects)
     left = max(FAR, LOOP_TOLD * ratio(story.data, story.base))
-    # A loop whose drive is another one is walked in vain.
+    # A loop whose drive is another one is walked in vain; one that lacks a limit, which is not straight, tells so
+    # only once that is refitted.
     if own.is_untold():
-        in_vain = own.suspects_drive() or beside.blames_controller()
+        in_vain = own.drive_leaves() > left if own.suspects_drive() else beside.blames_controller()
     else:
         in_vain = own.suspects_drive() and beside.blames_controller() and own.drive_leaves() > left
     if in_vain and beside.settles():
@@ -77,7 +79,7 @@ def walk(
         seen = story.data.measurements, story.current.calibration.actuator
         story.transmission_seen = transmission_seen(*seen)
         story.two_masses_seen = None if at_floor(story.data, story.current) else two_masses_seen(*seen)
-    story.disagreements = contradictions(story, tell)
+    story.disagreements = [*story.turned, *contradictions(story, tell)]
     return walked
 
 
@@ -113,6 +115,8 @@ class _Walk:
         for one in promising:
             if _of_drive(one):
                 self._tried.append(self.story.trial(one, self._tell))
+        if not self._tried:  # a score takes for straight what is not
+            self._tried += self.story.tried_whole([one for one in ranked if _of_drive(one)], self._tell)
         return min((ratio(self.story.data, trial.fit) for trial in self._tried), default=math.inf)
 
     def go(self) -> None:
@@ -179,6 +183,8 @@ class _Walk:
             story.add(fault)
             return True
         accepted = [trial for trial in trials if pays(story.current, trial, story.data, story.held)]
+        if put_right(story, trials[: 1 + _leading(trials, accepted)], tell):
+            accepted = [trial for trial in trials if pays(story.current, trial, story.data, story.held)]
         if not accepted and ratio(story.data, story.current) > FAR:
             trials = story.tried_whole([one for one in ranked if one not in [t.candidate for t in trials]], tell)
             accepted = [trial for trial in trials if pays(story.current, trial, story.data, story.held)]
@@ -254,6 +260,11 @@ class _Beside:
         if curve is None:
             return False
         return at_floor(story.data, curve.fit) or curve.fit.error() < HALF * story.current.error()
+
+
+def _leading(trials: Sequence[Trial], accepted: Sequence[Trial]) -> int:
+    """How many of the trials tell more than the first that is accepted; all but one where none is."""
+    return trials.index(accepted[0]) if accepted else len(trials) - 1
 
 
 def _with_curve(story: Story, curve: Trial | None, unknown: Explanation, tell: Progress) -> Explanation:

@@ -23,7 +23,7 @@ from emaviz.session.worker import Signal, Worker
 from emaviz.text.html import add_html
 from emaviz.text.results import begun, within
 
-# --- presses of buttons that nobody sees, by which a page tells the server of itself -----------------------------------
+# --- presses of buttons that nobody sees, by which a page tells the server of itself ----------------------------------
 
 # A page sends one message of its controls each 50 ms, the latest: of three presses at once it would drop the second,
 # and the server would never know of the tab or the size that it stands for.  They go one after another.

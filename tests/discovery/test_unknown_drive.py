@@ -135,7 +135,10 @@ def arm_of(folder, reach: float, hidden, names=None):
 LOADS = ("pendulum_load", "hinge_moment", "cubic_spring", "constant_load", "one_sided_spring")
 
 
-@pytest.mark.parametrize(("reach", "zero"), first_of([(1.0, 2.5), (2.0, 0.4), (2.0, 0.0), (1.0, -1.2)]))
+@pytest.mark.parametrize(
+    ("reach", "zero"),
+    [(1.0, 2.5), *(pytest.param(*one, marks=pytest.mark.long) for one in ((2.0, 0.4), (2.0, 0.0), (1.0, -1.2)))],
+)
 def test_an_arms_weight_is_named_where_the_travel_shows_its_sine(tmp_path, reach, zero):
     """It comes before hinge moment and cubic spring, the terms of its series."""
     found = arm_of(tmp_path, reach, lambda angle, speed: 0.02 * np.sin(angle - zero), LOADS)

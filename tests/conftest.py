@@ -5,6 +5,7 @@ from __future__ import annotations
 import gc
 import os
 import shutil
+import sys
 from collections.abc import Iterator
 
 import pytest
@@ -19,6 +20,9 @@ LONGEST = ("real_data", "units", "discovery")  # folders
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 # Tests take what a first use takes; what is compiled behind it, they would wait for elsewhere.
 os.environ["EMAVIZ_COMPILE_AHEAD"] = "0"
+# Programs that tests start begin as installed ones do: with their modules compiled, whatever this shell says of that.
+sys.dont_write_bytecode = False
+os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
 # An example's time is the machine's: the first one compiles what it calls, and others wait for a busy core.
 settings.register_profile("any time", deadline=None)
 settings.load_profile("any time")

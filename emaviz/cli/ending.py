@@ -109,8 +109,9 @@ def until_interrupted(run: Callable[[], int]) -> int:
     finally:
         if not _state.came:
             watch.end()
-    if _state.came:
-        # The interpreter's own way to end waits for threads, and takes the ground from those that compile.
+    # The interpreter's own way to end waits for threads, and takes the ground from those that compile.  After a refusal
+    # nothing is left to do: C++ would take down Arrow's threads, which on a busy machine have hardly begun, and abort.
+    if _state.came or code == ExitCode.WRONG_INPUT:
         atexit._run_exitfuncs()
         for stream in (sys.stdout, sys.stderr):
             with suppress(OSError, ValueError, AttributeError):

@@ -23,8 +23,26 @@ from emaviz.session.jobs import Signal, Worker
 from emaviz.text.html import add_html
 from emaviz.text.results import begun, within
 
+# --- presses of buttons that nobody sees, by which a page tells the server of itself ----------------------------------
+
+# A page sends one message of its controls each 50 ms, the latest: of three presses at once it would drop the second,
+# and the server would never know of the tab or the size that it stands for.  They go one after another.
+_PRESS_SCRIPT = """
+window.emavizPress ??= (() => {
+  const waiting = [];
+  let resting = false;
+  const next = () => {
+    resting = waiting.length > 0;
+    if (!resting) return;
+    document.getElementById(waiting.shift())?.click();
+    setTimeout(next, 60);
+  };
+  return (button) => { waiting.push(button); if (!resting) next(); };
+})();
+"""
+
+
 # --- which of the tabs on the right a window has in front, where what they show is drawn for those who see it ---------
-# Which of the tabs on the right a window has in front, where what they show is drawn for those who see it alone
 
 # On the page: the button of the title in front among those given, or that of none of them, is pressed at each change.
 _IN_FRONT_SCRIPT = """
@@ -37,10 +55,9 @@ _IN_FRONT_SCRIPT = """
     const tabs = all.filter(tab => tab.offsetParent && tab.textContent.trim() in buttons);
     if (!tabs.length) return;
     const front = tabs.find(t => t.getAttribute('aria-selected') === 'true')?.textContent.trim() ?? '';
-    const button = document.getElementById(buttons[front]);
-    if (!button || front === told) return;
+    if (!document.getElementById(buttons[front]) || front === told) return;
     told = front;
-    button.click();
+    window.emavizPress(buttons[front]);
   };
   const seen = new MutationObserver(look);
   seen.observe(document.body, { subtree: true, attributes: true, attributeFilter: ['aria-selected'] });
@@ -116,8 +133,8 @@ _SCRIPT = """
   };
   const look = () => {
     const all = tabs(), front = all.find(t => t.getAttribute('aria-selected') === 'true');
-    const now = front && view(front), button = now && document.getElementById(now.button);
-    if (!button) return;
+    const now = front && view(front);
+    if (!now || !document.getElementById(now.button)) return;
     if (wanted !== null && now.name !== wanted) {
       const tab = all.find(t => view(t).name === wanted);
       if (tab && Date.now() - pressed > 300) { pressed = Date.now(); press(tab); }
@@ -131,16 +148,16 @@ _SCRIPT = """
     const address = new URL(location.href);
     address.searchParams.set('view', told);
     history.replaceState(history.state, '', address);
-    button.click();
+    window.emavizPress(now.button);
   };
   const fit = () => {
     for (const [side, steps] of Object.entries(sizes)) {
       const step = steps.filter(s => s.px <= window[side]).pop() ?? steps[0];
-      const button = document.getElementById(step.button), rests = step.px === passing[side];
+      const rests = step.px === passing[side];
       passing[side] = step.px;  // while an edge is dragged, sizes would overtake each other on their way
-      if (!button || !rests || step.px === fitted[side]) continue;
+      if (!document.getElementById(step.button) || !rests || step.px === fitted[side]) continue;
       fitted[side] = step.px;
-      button.click();
+      window.emavizPress(step.button);
     }
   };
   const seen = new MutationObserver(look);
@@ -220,6 +237,7 @@ class Workspaces:
             {"name": name, "title": one.title, "inset": one.inset, "lower": one.lower, "button": id_of(buttons[name])}
             for name, one in self._members.items()
         ]
+        self._inside.run(_PRESS_SCRIPT)
         self._inside.run(window_layout.script())
         script = _SCRIPT.replace("VIEWS", json.dumps(views)).replace("SIZES", json.dumps(sizes))
         self._inside.run(script.replace("FIRST", json.dumps(self.first)))

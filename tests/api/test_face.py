@@ -23,7 +23,7 @@ NOTEBOOKS = sorted((PROJECT / "assets" / "notebooks").glob("*.ipynb"))
 
 @pytest.fixture(scope="module")
 def recording():
-    return em.simulate("chirp", faults={"k1": 0.25}, noise_A=0.1)
+    return em.simulate("chirp", faults={"k1": 0.25}, duration_s=0.25, noise_A=0.1)
 
 
 def test_a_recording_is_a_file_or_a_measurement_one_or_several(recording, tmp_path):
@@ -95,7 +95,7 @@ def test_one_of_several_that_is_too_short_is_left_out(recording, tmp_path):
 def test_what_is_fitted_is_not_held_out(recording, tmp_path):
     copy = tmp_path / "copy.csv"
     write_measurement(recording, copy)
-    other = em.simulate("chirp", faults={"k1": 0.25}, noise_A=0.1, seed=1)
+    other = em.simulate("chirp", faults={"k1": 0.25}, duration_s=0.25, noise_A=0.1, seed=1)
     for same, line in ((recording, "chirp: is both fitted and held out"), (em.read(copy), "copy: is both .*of chirp")):
         for analysis in (em.compare, em.discover):
             with pytest.raises(em.InputError, match=line):
@@ -119,8 +119,8 @@ def test_what_is_shown_in_a_notebook_is_escaped():
 
 
 def test_a_recording_and_its_health_show_themselves(recording, tmp_path):
-    assert re.search(r"^chirp: 5001 samples over 0\.500 s$", str(recording), re.M)
-    assert re.search(r"^  motor_speed_rad_s +−?\d+ +\d+ +rad/s$", str(recording), re.M)
+    assert re.search(r"^chirp: 2501 samples over 0\.250 s$", str(recording), re.M)
+    assert re.search(r"^  motor_speed_rad_s +−\d+\.\d +\d+\.\d +rad/s$", str(recording), re.M)
     path = tmp_path / "log.csv"
     names = ["t [ms]", "target position [deg]", "actual position [deg]", "<b>shaft"]
     columns = zip(1e3 * recording["time_s"], *(recording[name] for name in ("command_rad", "user_position_rad") * 2))

@@ -13,7 +13,7 @@ from support.on_page import choose, fill, wait_until
 from emaviz.page.track import TrackTab
 
 pytestmark = pytest.mark.browser
-COUNT = 40
+COUNT = 16
 # Where on the screen a flight's point is, once the chart is drawn.
 POINT = """(name) => {
   const plot = Array.from(document.querySelectorAll('.js-plotly-plot')).find(one => one.layout?.meta === 'flights');
@@ -25,7 +25,7 @@ POINT = """(name) => {
   const point = plot.calcdata[trace.index][at];
   return [box.x + xaxis.d2p(point.x), box.y + yaxis.d2p(point.y)];
 }"""
-LIFE = flights(0.02 * np.arange(COUNT + 1))  # k1, which reaches 0.5 in flight 26
+LIFE = flights(0.05 * np.arange(COUNT + 1))  # k1, which reaches 0.5 in flight 11
 
 
 @pytest.fixture
@@ -68,32 +68,32 @@ def test_a_life_is_followed(page, app, monkeypatch):
     fill(page, "Threshold", 0.5)
     page.get_by_text("k1 friction at 0.5").wait_for()
     page.get_by_role("button", name="Track", exact=True).click()
-    page.get_by_text("k1 friction drifts by 0.02").first.wait_for()
-    page.get_by_text(f"after flight_39: {COUNT} flights, {COUNT} of them usable").wait_for()
+    page.get_by_text("k1 friction drifts by 0.05").first.wait_for()
+    page.get_by_text(f"after flight_15: {COUNT} flights, {COUNT} of them usable").wait_for()
     wait_until(lambda: both_columns_are_filled(page), 20.0)  # the panel takes its width a moment later
 
-    fill(page, "Today, after flight", 15)
+    fill(page, "Today, after flight", 8)
     page.get_by_text("What came: k1 friction reached 0.5").wait_for()
-    page.get_by_text("after flight_14: 15 flights, 15 of them usable").wait_for()
+    page.get_by_text("after flight_07: 8 flights, 8 of them usable").wait_for()
     crossed = tab.following.history.crossed("k1")
-    page.get_by_text(f"reached 0.5, {crossed - 15} flights later").wait_for()
+    page.get_by_text(f"reached 0.5, {crossed - 8} flights later").wait_for()
     drawn = [plot.figure.layout.title.text for plot in tab.result._plots]
     assert [text.startswith(f"<b>{begins}") for text, begins in zip(drawn, ("k1", "Probability", "Remaining life"))]
 
-    shutil.copy(one, unit / "flight_40.parquet")  # today stays where it was dragged to
+    shutil.copy(one, unit / "flight_16.parquet")  # today stays where it was dragged to
     wait_until(lambda: len(tab.following.last.flights) == COUNT + 1, 30.0)
     page.get_by_text(f"unit ({COUNT + 1})").first.wait_for(state="attached")
-    page.get_by_text("after flight_14: 15 flights, 15 of them usable").wait_for()
+    page.get_by_text("after flight_07: 8 flights, 8 of them usable").wait_for()
 
     page.get_by_role("button", name="Compare this flight").click()
     page.wait_for_function("location.search.includes('view=compare')")
-    wait_until(lambda: [*app.comparing.opened] == ["unit/flight_14.parquet"])
+    wait_until(lambda: [*app.comparing.opened] == ["unit/flight_07.parquet"])
     app.comparing.job.stop()
 
     page.get_by_role("tab", name="Track", exact=True).click()
-    click_on(page, "flight_07")
+    click_on(page, "flight_03")
     page.wait_for_function("location.search.includes('view=compare')")
-    wait_until(lambda: [*app.comparing.opened] == ["unit/flight_07.parquet"])
+    wait_until(lambda: [*app.comparing.opened] == ["unit/flight_03.parquet"])
     app.comparing.job.stop()
 
     page.get_by_role("tab", name="Runs").click()
@@ -106,8 +106,8 @@ def test_a_life_is_followed(page, app, monkeypatch):
     wait_until(lambda: tab.following.history not in (None, before), 60.0)
     assert str(tab.following.last) == str(before.last) and tab.following.thresholds == {"k1": 0.5}
     page.get_by_role("tab", name="Track", exact=True).click()
-    page.get_by_text("k1 friction drifts by 0.02").first.wait_for()
-    page.get_by_text(f"after flight_40: {COUNT + 1} flights").wait_for()
+    page.get_by_text("k1 friction drifts by 0.05").first.wait_for()
+    page.get_by_text(f"after flight_16: {COUNT + 1} flights").wait_for()
 
 
 def test_what_is_missing_is_said_in_one_line(page, app):

@@ -27,6 +27,16 @@ RIGHT = {
 }
 
 
+# When the page has pressed which of the buttons that nobody sees, ms.
+PRESSES = """
+window.presses = [];
+addEventListener('click', event => {
+  const name = event.target.textContent;
+  if (/^(view|front|inner[A-Z][a-z]+):/.test(name)) window.presses.push([name, performance.now()]);
+}, true);
+"""
+
+
 @pytest.fixture(scope="module")
 def tab(browser, app):
     """One window for all tests here."""
@@ -66,6 +76,20 @@ def test_the_right_side_and_the_address_follow_the_tab(tab, app):
         wait_until(lambda first=first: right(tab)[:1] == [first], 10.0)
         assert tab.url.endswith(f"?view={name.lower()}")
         wait_until(lambda name=name: app.playback.on == name.lower(), 10.0)
+
+
+def test_what_a_window_tells_does_not_overtake_what_it_has_just_told(app, browser):
+    """Its tab, its size and what stands in front: of presses within 50 ms viser sends the first and the last alone."""
+    page = browser.new_page(viewport={"width": 1400, "height": 900})
+    page.add_init_script(PRESSES)
+    page.goto(f"{app.address}/?view=explore")
+    try:
+        page.wait_for_function("presses.length >= 4", timeout=60_000)  # view, width, height, in front
+        at = page.evaluate("presses")
+        assert {name.partition(":")[0] for name, _ in at} == {"view", "innerWidth", "innerHeight", "front"}
+        assert min(np.diff([ms for _, ms in at])) > 50.0, at
+    finally:
+        page.close()
 
 
 @pytest.mark.long

@@ -10,7 +10,7 @@ import shutil
 
 import pyarrow.parquet as pq
 import pytest
-from processes import begun, ended, free_port, rows_of
+from processes import free_port, rows_of
 from support.cheap_plans import cheap, written
 from support.documents import result_of
 
@@ -37,7 +37,7 @@ def made(tmp_path_factory):
     """A campaign of three tasks."""
     folder = tmp_path_factory.mktemp("made")
     plan = cheap(folder, 3)
-    ended(begun(plan, "--out", folder / "out", "--workers", "1"))
+    run_plan(load_plan(plan), folder / "out", Here())
     return plan, folder / "out"
 
 

@@ -163,7 +163,7 @@ for line in json.load(sys.stdin):
             code = main(line.split())
         except SystemExit as ended:
             code = ended.code
-    heavy = ("numpy", "numba", "scipy", "msgspec", "pyarrow", "plotly", "rerun", "viser")
+    heavy = ("numpy", "numba", "scipy", "msgspec", "pyarrow", "pandas", "plotly", "rerun", "viser")
     print(json.dumps([line, code, [name for name in heavy if name in sys.modules]]))
 """
 AT_ONCE = {
@@ -177,12 +177,20 @@ AT_ONCE = {
 }
 WITHOUT_KERNELS = [
     *("compare missing*.csv", "identify .", "compare bad.csv", "discover bad.csv --actuator bad.csv", "view bad.csv"),
+    *("compare short.csv", "compare unknown.csv", "compare words.csv"),
     *("simulate --out missing/x.csv", "identify --fault k9=0.1", "simulate --set amplitude=1 --out x.csv"),
 ]
 
 
 def runs(lines, folder):
     (folder / "bad.csv").write_text("a,b\n1,2\n")
+    for name, columns, rows, last in (
+        ("short", "time_s,current_A", 50, "1"),
+        ("unknown", "a,b", 200, "1"),
+        ("words", "time_s,current_A", 200, "many"),
+    ):
+        text = [columns, *(f"{i * 1e-3},1" for i in range(rows)), f"{rows * 1e-3},{last}", f"{rows * 1e-3 + 1e-3},1"]
+        (folder / f"{name}.csv").write_text("\n".join(text))
     command, given = [sys.executable, "-c", RUNS_ALL], json.dumps(lines)
     done = subprocess.run(command, input=given, cwd=folder, capture_output=True, text=True, check=True)
     return [tuple(json.loads(line)) for line in done.stdout.splitlines()]
@@ -195,7 +203,8 @@ def test_help_completion_and_refused_arguments_import_nothing_that_computes(tmp_
 
 def test_a_refused_file_needs_no_kernels(tmp_path):
     for line, code, modules in runs(WITHOUT_KERNELS, tmp_path):
-        assert code == 2 and not {"numba", "scipy", "plotly", "rerun", "viser"} & set(modules), (line, code, modules)
+        heavy = {"numba", "scipy", "pandas", "plotly", "rerun", "viser"} & set(modules)
+        assert code == 2 and not heavy, (line, code, modules)
 
 
 def test_the_names_that_options_list_are_the_models():

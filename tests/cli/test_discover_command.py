@@ -15,7 +15,7 @@ def rig(tmp_path_factory):
     """Two recordings with hidden cogging: a sine to fit, a chirp to hold out."""
     folder = tmp_path_factory.mktemp("rig")
     common = ["--effect", "cogging_torque:amplitude_Nm=0.02,order=12", "--noise-current", "0.3", "--encoder-bits", "12"]
-    sine = ["--command", "sine", "--set", "amplitude_rad=0.03", "--set", "frequency_Hz=3", "--duration", "1"]
+    sine = ["--command", "sine", "--set", "amplitude_rad=0.03", "--set", "frequency_Hz=3", "--duration", "0.7"]
     assert main(["simulate", *common, *sine, "--out", str(folder / "sine.csv")]) == 0
     assert main(["simulate", *common, "--seed", "1", "--out", str(folder / "chirp.csv")]) == 0
     return folder

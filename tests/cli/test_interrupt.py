@@ -327,3 +327,17 @@ print(code, [thread.name for thread in threading.enumerate()])
 def test_no_thread_outlives_main(process_of):
     out, _ = process_of("-c", LEFT).communicate(timeout=60)
     assert out == "2 ['MainThread']\n"
+
+
+def test_a_refusal_waits_for_no_thread(process_of):
+    """Threads of Arrow's that have hardly begun as the program ends would abort it (exit code 134)."""
+    program = """
+import sys, threading, time
+from emaviz.cli import main
+threading.Thread(target=time.sleep, args=(90.0,)).start()
+sys.argv = ["emaviz", "compare", "missing.csv"]
+sys.exit(main())
+"""
+    process = process_of("-c", program)
+    _, said = process.communicate(timeout=45.0)
+    assert process.returncode == 2 and "missing.csv: no such file" in said

@@ -21,14 +21,25 @@ def actuator(request, tmp_path) -> Actuator:
     return drive_of(tmp_path, leaves_out_reversals=request.param == "steady parts")
 
 
+# By rate, Hz, noise, A, and the encoder's counts.
+LOGGED = {"noise": (500.0, 0.2, None), "noise, logged fast": (2000.0, 0.2, None), "coarse": (1000.0, 0.05, 652.0)}
+
+
 @pytest.mark.parametrize(
-    ("rate_Hz", "noise_A", "counts"),
-    [(500.0, 0.2, None), (2000.0, 0.2, None), (1000.0, 0.05, 652.0)],
-    ids=["noise", "noise, logged fast", "a coarse encoder"],
+    ("steady", "log"),
+    [
+        (False, "coarse"),
+        (True, "noise"),
+        *(
+            pytest.param(*one, marks=pytest.mark.long)
+            for one in ((False, "noise"), (False, "noise, logged fast"), (True, "noise, logged fast"), (True, "coarse"))
+        ),
+    ],
 )
-def test_a_true_model_is_adequate_and_at_its_floor(actuator, rate_Hz, noise_A, counts):
+def test_a_true_model_is_adequate_and_at_its_floor(tmp_path, steady, log):
     """A filter leaves noise alike for a while, which is no lasting error; what it cannot know at the ends, is none."""
-    found = [compare([logged(seed, rate_Hz, noise_A, counts)], actuator) for seed in SEEDS]
+    actuator = drive_of(tmp_path, leaves_out_reversals=steady)
+    found = [compare([logged(seed, *LOGGED[log])], actuator) for seed in SEEDS]
     error = np.array([one.over_floor for one in found])
     print(np.round(error, 3), np.round(np.mean([one.floor_band for one in found], axis=0), 3))
     assert 0.9 <= np.median(error) <= 1.03

@@ -31,7 +31,8 @@ def check(found, faults, effect):
     assert found.ladder[-1].rmse < BAND and found.ladder[-1].holdout_rmse < BAND
 
 
-@pytest.mark.parametrize("candidates", [SPRINGS, pytest.param(None, marks=pytest.mark.long)], ids=["springs", "all"])
+@pytest.mark.long
+@pytest.mark.parametrize("candidates", [SPRINGS, None], ids=["springs", "all"])
 def test_an_effect_that_stands_only_beside_a_fault_is_claimed_with_it(candidates):
     """Beside the shorted phase alone each recording asks for another spring, and a cubic one would take its place."""
     faults = {"k3": 0.26}

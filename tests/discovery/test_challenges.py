@@ -162,6 +162,7 @@ def test_the_easy_one_is_solved():
     assert found.ladder[-1].rmse < 1.1 and found.ladder[-1].holdout_rmse < 1.1
 
 
+@pytest.mark.long
 def test_the_readme_shows_what_discovery_says(tmp_path):
     """The ladder and the names of its example, as somebody meets it who tries it.
 

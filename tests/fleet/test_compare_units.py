@@ -109,7 +109,8 @@ def test_equal_units_are_equal_and_a_missing_recording_is_named():
     assert re.search("unit_02 tells nothing of motor .*resistance: a recording like step would", str(found))
 
 
-@pytest.mark.parametrize(("warmer_K", "allowed"), [pytest.param(30.0, True, marks=pytest.mark.long), (70.0, False)])
+@pytest.mark.long
+@pytest.mark.parametrize(("warmer_K", "allowed"), [(30.0, True), (70.0, False)])
 def test_a_warmer_winding_is_the_recordings_and_not_the_units(warmer_K, allowed):
     """Copper's 0.39 % a kelvin: of two steps at the voltage's limit one is driven by a warmer motor."""
     fleet = draw(ACTUATOR, 5, units=2, differing=0)

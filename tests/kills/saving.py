@@ -1,16 +1,13 @@
-"""What can be saved, over and over until the process is killed, and how it is read back.
-
-python saving.py KIND FILE
-"""
+"""What can be saved, over and over until the process is killed, and how it is read back."""
 
 from __future__ import annotations
 
 import itertools
 import json
-import sys
 from argparse import Namespace
 from collections.abc import Callable
 from dataclasses import replace
+from multiprocessing.connection import Connection
 from pathlib import Path
 
 import numpy as np
@@ -74,10 +71,10 @@ KINDS: dict[str, tuple[Callable[[Path, int], None], Callable[[Path], object]]] =
 }
 
 
-if __name__ == "__main__":
-    target = Path(sys.argv[1])
+def save_over_and_over(target: Path, begun: Connection) -> None:
+    """Says when the first one is there."""
     save, _ = KINDS[target.name]
     save(target, 0)
-    print("ready", flush=True)
+    begun.send(True)
     for number in itertools.count(1):
         save(target, number)

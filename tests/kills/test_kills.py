@@ -2,34 +2,36 @@
 
 from __future__ import annotations
 
+import multiprocessing
 import os
-import subprocess
-import sys
 import time
 from collections import Counter
 from pathlib import Path
 
 import numpy as np
 import pytest
-from saving import KINDS, SIZE
+from saving import KINDS, SIZE, save_over_and_over
 
 from ema_model.files.written import remove_abandoned
 from emaviz.recording.read import recover
 
+# Each begins with all imports done, by a server that has done them once.
+PROCESSES = multiprocessing.get_context("forkserver")
+PROCESSES.set_forkserver_preload(["saving"])
 LONGEST_S = 0.25  # until the kill; several savings of each kind
 
 
 def killed_while_saving(target: Path, after_s: float) -> None:
     """Saves to the target over and over in a process, and kills it."""
-    process = subprocess.Popen(
-        [sys.executable, str(Path(__file__).with_name("saving.py")), str(target)], stdout=subprocess.PIPE, text=True
-    )
+    started, begun = PROCESSES.Pipe(duplex=False)
+    process = PROCESSES.Process(target=save_over_and_over, args=(target, begun))
+    process.start()
     try:
-        assert process.stdout is not None and process.stdout.readline() == "ready\n"
+        assert started.poll(60.0) and started.recv()
         time.sleep(after_s)
     finally:
         process.kill()
-        process.communicate()
+        process.join()
 
 
 def kill(folder: Path, names: list[str], seed: int) -> Counter[str]:

@@ -14,6 +14,7 @@ from scipy.io import savemat
 from ema_model.errors import InputError
 from ema_model.recordings import SIGNALS, Measurement, read_columns, write_measurement
 from ema_model.recordings.formats import FORMATS, WRITTEN
+from ema_model.recordings.formats.arrow import as_numpy, mask
 from ema_model.recordings.read import read_measurement
 
 N = 150
@@ -26,6 +27,35 @@ def assert_same(measurement, columns=COLUMNS):
     for name, values in columns.items():
         np.testing.assert_array_equal(measurement[name], np.asarray(values, float).ravel())
         assert measurement[name].dtype == np.float64 and measurement[name].dtype.isnative
+
+
+@pytest.mark.parametrize(
+    "column",
+    [
+        pa.array([1.5, None, -2.0]),
+        pa.array([1, 2, 3], pa.int16()),
+        pa.array([1, None, 3], pa.uint32()),
+        pa.array([0.5, 0.25], pa.float32()),
+        pa.array([True, False, True, True]),
+        pa.array([], pa.float64()),
+        pa.array(range(9)).slice(2, 5),
+        pa.chunked_array([pa.array([1.0, 2.0]).slice(1), pa.array([None, 4.0])]),
+        pa.chunked_array([[True, False], [], [False]]),
+    ],
+    ids=str,
+)
+def test_arrows_columns_are_numpys_as_arrow_would_make_them(column):
+    alone = column if isinstance(column, pa.ChunkedArray) else pa.chunked_array([column])
+    expected = alone.to_numpy()
+    for one in (column, alone):
+        found = as_numpy(one)
+        np.testing.assert_array_equal(found, expected)
+        assert found.dtype == expected.dtype and found.flags.writeable
+
+
+def test_what_is_masked_reaches_arrow():
+    kept = np.array([True, False, True, True, False, True, False, False, True])
+    assert pa.array(range(9)).filter(mask(kept)).to_pylist() == [0, 2, 3, 5, 8]
 
 
 def test_the_formats_that_are_written():

@@ -251,7 +251,7 @@ def test_an_error_reads_alike_wherever_it_is_told(sizes, comparison):
     recording = written("The answer", told.document.blocks)
     assert f" | {size} | {least} | " in recording and f" | {unit} |" in recording
     unseen = replace(comparison.recordings[0], errors=told.signals)
-    assert f"{size} {unit} (floor {least} {unit})" in held_out(unseen)
+    assert f"{size} {unit} (floor {least} {unit}: " in held_out(unseen)
 
 
 def test_an_order_reads_alike_in_the_sentence_and_in_the_terminal(comparison):

@@ -8,10 +8,11 @@ from playwright.sync_api import Error
 
 def wait_until(condition, seconds=240.0):
     """Of a loaded machine that compiles, too; only a failure waits that long."""
-    end = time.monotonic() + seconds
+    end, pause_s = time.monotonic() + seconds, 0.02
     while not condition():
         assert time.monotonic() < end
-        time.sleep(0.02)
+        time.sleep(pause_s)
+        pause_s = min(1.3 * pause_s, 0.1)  # to ask a page takes milliseconds of its core and of ours
 
 
 def field(page, label):

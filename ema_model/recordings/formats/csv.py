@@ -21,6 +21,7 @@ from ema_model.files.opened import LINE_BYTES, listed, megabytes, refusal, shown
 from ema_model.quantities.axes import SIGNALS
 from ema_model.quantities.unit_conversion import find_unit
 from ema_model.recordings.column_names import is_time, readings
+from ema_model.recordings.formats.arrow import as_numpy, mask
 from ema_model.recordings.formats.channels import beside_time, tokens, with_unit
 from ema_model.recordings.formats.clocks import Clocks, between, covered, is_state, main_clock, rule
 from ema_model.recordings.formats.format import Array, Columns, Format, check_size
@@ -198,12 +199,12 @@ def _is_head(table: TextTable, i: int, cell: str) -> bool:
 
 def _column(table: TextTable, i: int, text: pa.ChunkedArray) -> tuple[Array, np.ndarray, np.ndarray]:
     """A column's numbers, which of its cells are none, and which are blank."""
-    blank = np.asarray(text.is_null())
+    blank = as_numpy(text.is_null())
     if i in table.stamps and not blank.all():
         whole = compute.fill_null(text, "")
-        right = np.asarray(compute.match_substring_regex(whole, r"\d{1,2}:\d{2}:\d{2}"))
+        right = as_numpy(compute.match_substring_regex(whole, r"\d{1,2}:\d{2}:\d{2}"))
         values = np.full(len(text), np.nan)
-        stamps = seconds(pa.chunked_array([whole.filter(pa.array(right))])) if right.any() else None
+        stamps = seconds(pa.chunked_array([whole.filter(mask(right))])) if right.any() else None
         if stamps is not None:
             values[right] = stamps
             return values, ~right, blank
@@ -212,9 +213,9 @@ def _column(table: TextTable, i: int, text: pa.ChunkedArray) -> tuple[Array, np.
         text = compute.replace_substring(text, table.layout.thousands, "")
     if table.layout.decimal == ",":
         text = compute.replace_substring(text, ",", ".")
-    right = np.asarray(compute.fill_null(compute.match_substring_regex(text, _NUMBER_CELL), False))
-    kept = compute.if_else(pa.array(right), text.combine_chunks(), pa.scalar(None, pa.string()))
-    values = compute.cast(compute.utf8_trim_whitespace(kept), pa.float64()).to_numpy(zero_copy_only=False)
+    right = as_numpy(compute.match_substring_regex(text, _NUMBER_CELL)) == 1.0  # a blank is NaN
+    kept = compute.if_else(mask(right), text.combine_chunks(), pa.nulls(len(text), pa.string()))
+    values = as_numpy(compute.cast(compute.utf8_trim_whitespace(kept), pa.float64()))
     return values, ~right, blank
 
 
@@ -285,7 +286,7 @@ def _numbers_at_once(table: TextTable, places: Sequence[int]) -> dict[int, Array
         return None
     if any(column.null_count for column in whole.columns):
         return None
-    return {i: whole.column(f"{i}").to_numpy() for i in places}
+    return {i: as_numpy(whole.column(f"{i}")) for i in places}
 
 
 def _check_text(table: TextTable, max_bytes: int) -> None:
@@ -549,7 +550,7 @@ def _read(path: str, names: Sequence[str], max_bytes: int, strict: bool) -> Colu
         notes.append("numbers are written with a decimal comma")
     columns = dict(zip(names, table.columns))
     del table  # each column goes when it is converted
-    arrays = {name: columns.pop(name).to_numpy() for name in names}
+    arrays = {name: as_numpy(columns.pop(name)) for name in names}
     return Columns(arrays, lambda row: _place(path, dialect, row), tuple(notes))
 
 

@@ -16,6 +16,7 @@ import pyarrow.parquet as pq
 from ema_model.errors import quoted
 from ema_model.files.opened import COLUMNS, megabytes, refusal, shown
 from ema_model.recordings.formats import robot_dataset
+from ema_model.recordings.formats.arrow import as_numpy
 from ema_model.recordings.formats.channels import MOST_COLUMNS
 from ema_model.recordings.formats.format import Array, Columns, Format, check_size
 
@@ -221,9 +222,9 @@ def _read(path: str, names: Sequence[str], max_bytes: int, strict: bool) -> Colu
         if part is not None:
             column = _part(path, name, column, part)
         if not column.null_count:
-            arrays[name] = column.to_numpy().astype(np.float64, copy=False)
+            arrays[name] = as_numpy(column).astype(np.float64, copy=False)
         elif strict:
-            row = np.flatnonzero(column.is_null().to_numpy())[0]
+            row = np.flatnonzero(as_numpy(column.is_null()))[0]
             raise refusal(
                 path, f"{_place(row)}, column {quoted(name)!r}: blank; a number is expected, fill or remove the row"
             )

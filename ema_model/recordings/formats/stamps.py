@@ -10,6 +10,8 @@ import pyarrow as pa
 import pyarrow.compute
 from numpy.typing import NDArray
 
+from ema_model.recordings.formats.arrow import as_numpy
+
 _CLOCK = r"(?P<clock>\d{1,2}:\d{2}:\d{2}([.,:]\d{1,9})?)\s*(?P<half>[AaPp]\.?[Mm]\.?)?\s*(Z|[+-]\d{2}:?\d{2})?"
 _STAMP = re.compile(
     rf"((?P<date>\d{{4}}[-/]\d{{1,2}}[-/]\d{{1,2}}|\d{{1,2}}[./-]\d{{1,2}}[./-](\d{{4}}|\d{{2}}))[T ,]\s*)?{_CLOCK}"
@@ -37,7 +39,7 @@ def seconds(cells: pa.ChunkedArray) -> NDArray[np.float64] | None:
     clock = pc.replace_substring_regex(clock, r"(:\d{2}:\d{2}):(\d+)", r"\1.\2")
     afternoon = None
     if first["half"]:
-        afternoon = pc.match_substring_regex(clock, r"[Pp]\.?[Mm]\.?$").to_numpy().astype(bool)
+        afternoon = as_numpy(pc.match_substring_regex(clock, r"[Pp]\.?[Mm]\.?$"))
         clock = pc.replace_substring_regex(clock, r"\s*[AaPp]\.?[Mm]\.?$", "")
     days = _days(clock) if first["date"] else None
     if first["date"]:
@@ -47,9 +49,7 @@ def seconds(cells: pa.ChunkedArray) -> NDArray[np.float64] | None:
     parts = pc.extract_regex(clock, r"^(?P<h>\d{1,2}):(?P<m>\d{2}):(?P<s>\d{2}\.?\d*)$")
     if parts.null_count:
         return None
-    hours, minutes, rest = (
-        pc.struct_field(parts, [i]).cast(pa.float64()).to_numpy() for i in range(3)
-    )  # fmt: skip
+    hours, minutes, rest = (as_numpy(pc.struct_field(parts, [i]).cast(pa.float64())) for i in range(3))
     if afternoon is not None:
         hours = hours % 12.0 + 12.0 * afternoon
     values = 3600.0 * hours + 60.0 * minutes + rest
@@ -66,7 +66,7 @@ def _days(text: pa.ChunkedArray) -> NDArray[np.float64] | None:
     parts = pc.extract_regex(date, r"^(?P<a>\d+)-(?P<b>\d+)-(?P<c>\d+)$")
     if parts.null_count:
         return None
-    a, b, c = (pc.struct_field(parts, [i]).cast(pa.int64()).to_numpy() for i in range(3))
+    a, b, c = (as_numpy(pc.struct_field(parts, [i]).cast(pa.int64())) for i in range(3))
     if np.max(a) > 31:
         year, month, day = a, b, c
     else:

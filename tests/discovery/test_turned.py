@@ -36,7 +36,7 @@ def found_of(folder, held: Measurement, **how) -> Discovery:
 def test_a_map_against_a_turned_one_names_its_cogging(tmp_path, turned_rad):
     found = found_of(tmp_path, held_map(5, turned_rad))
     assert found.verdict == "effects_found" and [one.name for one in found.effects] == ["cogging_torque"]
-    assert found.ladder[-1].holdout_rmse < 1.2
+    assert (found.ladder[-1].holdout_rmse or 9.0) < 1.2
     if turned_rad == 0.0:
         assert not found.disagreements
         return
@@ -51,7 +51,7 @@ def test_a_map_against_a_turned_one_names_its_cogging(tmp_path, turned_rad):
 def test_a_map_of_several_orders_tells_the_turn_itself(tmp_path, turned_rad, sign, said):
     waves = ((0.004, 7.0, 0.4), (0.003, 12.0, 1.1))
     found = found_of(tmp_path, held_map(5, turned_rad, sign, waves=waves), waves=waves)
-    assert {one.name for one in found.effects} == {"cogging_torque"} and found.ladder[-1].holdout_rmse < 1.3
+    assert {one.name for one in found.effects} == {"cogging_torque"} and (found.ladder[-1].holdout_rmse or 9.0) < 1.3
     [one] = found.disagreements
     assert said in one.sentence and one.how == ("zero" if sign > 0.0 else "sign")
 

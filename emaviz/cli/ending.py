@@ -80,11 +80,11 @@ class PartialAnswer:
 
 
 def until_interrupted(run: Callable[[], int]) -> int:
-    """Runs the program and returns its exit code; an interrupt ends the whole process instead, within two seconds.
+    """Runs the program and returns its exit code; an interrupt or a refusal ends the whole process instead.
 
-    It is raised once, as KeyboardInterrupt.  A second one ends the process at once, and so does the first after a
-    while: native code holds it up, and callbacks swallow it.  A `PartialAnswer` makes that while longer.  Where
-    interrupts are ignored, they stay ignored.
+    An interrupt does so within two seconds.  It is raised once, as KeyboardInterrupt.  A second one ends the process at
+    once, and so does the first after a while: native code holds it up, and callbacks swallow it.  A `PartialAnswer`
+    makes that while longer.  Where interrupts are ignored, they stay ignored.
     """
     if signal.getsignal(signal.SIGINT) is not signal.default_int_handler:
         return run()

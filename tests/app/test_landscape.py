@@ -129,6 +129,7 @@ def answer(**known):
         "warnings": (),
         "separated_by": None,
         "hardly_known": (),
+        "identifiable": (),
         "uninformative": False,
     }
     return SimpleNamespace(uncertainty=SimpleNamespace(**{**usual, **known}), polished=True)

@@ -315,18 +315,19 @@ def test_a_caller_of_main_keeps_its_own_handling(tmp_path, monkeypatch):
 
 
 LEFT = """
-import sys, threading
+import atexit, sys, threading
 from emaviz.cli import main
 
+atexit.register(lambda: print([thread.name for thread in threading.enumerate()], flush=True))
 sys.argv = ["emaviz", "compare", "--fruit"]
-code = main()
-print(code, [thread.name for thread in threading.enumerate()])
+main()
 """
 
 
 def test_no_thread_outlives_main(process_of):
-    out, _ = process_of("-c", LEFT).communicate(timeout=60)
-    assert out == "2 ['MainThread']\n"
+    process = process_of("-c", LEFT)
+    out, _ = process.communicate(timeout=60)
+    assert process.returncode == 2 and out == "['MainThread']\n"
 
 
 def test_a_refusal_waits_for_no_thread(process_of):

@@ -20,8 +20,8 @@ from ema_model.comparison.criteria import (
     EVENT_SHARE,
     EVENT_T,
 )
+from ema_model.comparison.error_in_floors import ratio
 from ema_model.comparison.explain import Explanation, modulator_of, quantile_knots, used_blocks, without_spikes
-from ema_model.comparison.over_floor import ratio
 from ema_model.comparison.residuals import Residuals, event_sentence, range_text, region_sentence
 from ema_model.quantities.axes import Axes
 from ema_model.recordings import SIGNALS

@@ -12,9 +12,9 @@ from msgspec import Meta
 from numpy.typing import NDArray
 
 from ema_model.actuator.parameters import on_axes
+from ema_model.comparison.error_in_floors import UNKNOWN, OverFloor
 from ema_model.comparison.explain import Explanation
 from ema_model.comparison.free_simulation import Score, Simulated, without
-from ema_model.comparison.over_floor import UNKNOWN, OverFloor
 from ema_model.comparison.regions import Event, Region
 from ema_model.comparison.residuals import Residuals, dependence
 from ema_model.estimation.calibrate import (
@@ -512,7 +512,7 @@ def as_dict(comparison: Comparison) -> ComparisonJson:
     document: ComparisonJson = {
         "verdict": comparison.verdict,
         "adequate": comparison.adequate,
-        "over_floor": comparison.over_floor,
+        "over_floor": comparison.error_in_floors,
         "floor_band": list(comparison.floor_band),
         "within_band": comparison.is_within_band,
         "holdout_over_floor": None if comparison.unseen is None else comparison.unseen.error,

@@ -9,10 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ema_model.actuator import Actuator
+from ema_model.comparison.error_in_floors import OverFloor
 from ema_model.comparison.explain import Explanation
 from ema_model.comparison.free_simulation import Simulated
 from ema_model.comparison.loop_lag import LoopLag
-from ema_model.comparison.over_floor import OverFloor
 from ema_model.comparison.regions import Event
 from ema_model.discovery.criteria import EVIDENCE, FAR
 from ema_model.discovery.observed.controller import ControllerSeen

@@ -116,8 +116,8 @@ def test_nothing_is_adequate_beside_it(monkeypatch):
         (
             TransmissionSeen(1e-4, 1e-5, "acceleration", frequency_Hz=32.0),
             False,
-            "Something is missing that none of the known effects explains: 1.35 times the floor remains, cause unknown; and "
-            "the user's position leaves the motor's as by the twist of a shaft.",
+            "Something is missing that none of the known effects explains: 1.35 times the floor remains, "
+            "cause unknown; and the user's position leaves the motor's as by the twist of a shaft.",
         ),
     ],
 )

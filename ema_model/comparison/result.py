@@ -512,7 +512,7 @@ def as_dict(comparison: Comparison) -> ComparisonJson:
     document: ComparisonJson = {
         "verdict": comparison.verdict,
         "adequate": comparison.adequate,
-        "over_floor": comparison.error_in_floors,
+        "over_floor": comparison.over_floor,
         "floor_band": list(comparison.floor_band),
         "within_band": comparison.is_within_band,
         "holdout_over_floor": None if comparison.unseen is None else comparison.unseen.error,

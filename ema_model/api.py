@@ -294,6 +294,7 @@ def discover(
     signals: Sequence[str] | None = None,
     candidates: Sequence[str] | None = None,
     most_effects: int = 3,
+    engine: str = "steps",
     on_progress: Callable[[str], None] | None = None,
     stop: Callable[[], bool] | None = None,
 ) -> Discovery:
@@ -305,6 +306,8 @@ def discover(
     signals: names of signals to fit; current and positions without it.
     candidates: names of the effects to consider; all of `emaviz effects` without it.
     most_effects: how many are added at most.
+    engine: "steps" refits what fits best and asks what speaks against it; "evidence" compares how probable models are,
+    and says so.  The second is new.
     on_progress: takes a text that says what goes on; what it raises ends the discovery.
     stop: is asked as often, once the model is calibrated; where it is true, what was added so far is the answer.
     """
@@ -316,6 +319,7 @@ def discover(
         signals=signals,
         candidates=candidates,
         most_effects=most_effects,
+        engine=engine,
         on_progress=on_progress,
         stop=stop,
     )

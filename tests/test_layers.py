@@ -38,6 +38,7 @@ FLOORS = {
         ["evidence", "verify"],
         ["candidates", "words"],
         ["steps"],
+        ["search"],
         ["discover"],
     ],
     "emaviz": [

@@ -17,20 +17,24 @@ from ema_model.discovery.evidence.remaining import left_by
 from ema_model.discovery.evidence.uncertainty import with_intervals
 from ema_model.discovery.observed.repeated import repeated
 from ema_model.discovery.result import Candidate, Discovery, Experiment, errors_of
+from ema_model.discovery.search.search import Search
 from ema_model.discovery.steps.begin import begun
 from ema_model.discovery.steps.path import Story
 from ema_model.discovery.steps.second_opinion import other_loop, support_of
 from ema_model.discovery.steps.step import refreshed
 from ema_model.discovery.steps.verdict import explains_all, verdict_of
-from ema_model.discovery.steps.walking import named_in, walk
+from ema_model.discovery.steps.walking import Walk, named_in, walk
 from ema_model.discovery.verify import free_simulation
 from ema_model.discovery.words import as_well, held_back, mismatch, untold
 from ema_model.effects import CATALOGUE
-from ema_model.errors import InputError, quoted
+from ema_model.errors import InputError, did_you_mean, quoted
 from ema_model.quantities.numbers import as_number
 from ema_model.recordings import Measurement
 
 Progress = Callable[[str], None]
+
+
+ENGINES: Mapping[str, type[Walk]] = {"steps": Walk, "evidence": Search}
 
 
 class _Stopped(Exception):
@@ -45,6 +49,7 @@ def discover(
     signals: Sequence[str] | None = None,
     candidates: Sequence[str] | None = None,
     most_effects: int = 3,
+    engine: str = "steps",
     on_progress: Progress | None = None,
     stop: Callable[[], bool] | None = None,
 ) -> Discovery:
@@ -53,8 +58,12 @@ def discover(
     holdout: recordings that are not fitted and must improve as well; candidates: effects to consider, all of the
     catalogue's without it.  on_progress is told what goes on, and may raise to stop.  stop() is asked as often once
     the model is calibrated; where it is true, what was added so far is the answer, with the verdict "interrupted".
+    engine: of `ENGINES`, how it goes on.
     Raises InputError for recordings that cannot be compared.
     """
+    if engine not in ENGINES:
+        like = did_you_mean(engine, ENGINES)
+        raise InputError(f"no engine {quoted(engine, 40)!r}; there are {', '.join(ENGINES)}{like}")
     if not as_number(most_effects) >= 0.0:
         raise InputError(f"most_effects must be a number from 0 on, not {quoted(repr(most_effects), 40)}")
     progress = on_progress or (lambda text: None)
@@ -72,7 +81,7 @@ def discover(
         return result_of(story)
     try:
         go_on()
-        walked = walk(story, tell, candidates=candidates, most_effects=most_effects)
+        walked = walk(story, tell, candidates=candidates, most_effects=most_effects, engine=ENGINES[engine])
         experiment = None
         if walked.rivals:
             tell("looking for a test that tells the rivals apart")

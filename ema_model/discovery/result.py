@@ -48,6 +48,7 @@ class Candidate:
     untestable_reason: str = ""
     refitted_drop: float | None = None  # of χ², where it was refitted
     cannot_represent: str = ""  # why the model has no place for it, whatever is recorded
+    probability: float | None = None  # that this, of all candidates or none, is missing; None: of the engine by steps
 
     @property
     def obstacle(self) -> str:
@@ -122,6 +123,7 @@ class Added:
     supported_by: tuple[str, ...] = ()  # of "closed_loop" and "inverse_dynamics"
     stands_for: str = ""  # the path of the base parameter whose value outside its tolerance it is
     of_the_file: bool = False  # whether the file has it, at other values
+    probability: float | None = None  # that it, or what cannot be told from it, is missing; None: not known
 
 
 @dataclass(frozen=True)
@@ -246,8 +248,8 @@ class Discovery(InWords):
 
     @property
     def ranked(self) -> list[Candidate]:
-        """Best first: by what a refit gave, then by what was predicted; last what these recordings cannot show."""
+        """Best first: by how probable they are, or what a refit gave, then by what was predicted; obstacles last."""
         return sorted(
             self.candidates,
-            key=lambda one: (bool(one.obstacle), one.refitted_drop is None, -one.drop),
+            key=lambda one: (bool(one.obstacle), -(one.probability or 0.0), one.refitted_drop is None, -one.drop),
         )

@@ -395,11 +395,21 @@ def candidates(found: Discovery) -> Table | None:
             effect_title(one.name),
             "–" if one.obstacle else f"{one.predicted_drop:.0f}",
             _refitted(one),
+            *(() if one.probability is None else (in_percent(one.probability),)),
         ]
         for one in found.ranked
     ]
     remarks = [one.obstacle for one in found.ranked]
-    return Table(("predicted", "refitted"), rows, "candidates", remarks, "(fall of χ²)")
+    is_probable = found.candidates[0].probability is not None
+    head = ("predicted", "refitted", *(("probable",) if is_probable else ()))
+    return Table(head, rows, "candidates", remarks, "(fall of χ²)")
+
+
+def in_percent(probability: float) -> str:
+    """'97 %', '> 99.9 %', '< 0.1 %'."""
+    if probability > 0.999:
+        return "> 99.9 %"
+    return "< 0.1 %" if probability < 0.001 else f"{100.0 * probability:.3g} %"
 
 
 def _refitted(one: Candidate) -> str:
@@ -541,6 +551,9 @@ class AddedJson(TypedDict):
     holdout_rmse_after: Annotated[float | None, Meta(description="of what was not fitted, with it; null: nothing")]
     same_as: Annotated[list[str], Meta(description="effects and faults that these recordings cannot tell from it")]
     supported_by: Annotated[list[str], Meta(description="the models that bear it out: closed_loop, inverse_dynamics")]
+    probability: Annotated[
+        float | None, Meta(description="that it, or one of same_as, is missing; null: --engine steps, or a curve")
+    ]
 
 
 class RungJson(TypedDict):
@@ -572,6 +585,9 @@ class CandidateJson(TypedDict):
     settings: Annotated[dict[str, float | None], Meta(description="its best settings, by the names in files")]
     untestable_reason: Annotated[str, Meta(description="why these recordings cannot show it; empty where they can")]
     cannot_represent: Annotated[str, Meta(description="why this model has no place for it; empty where it has one")]
+    probability: Annotated[
+        float | None, Meta(description="that this, of all candidates or none, is missing; null: --engine steps")
+    ]
 
 
 class UnknownJson(TypedDict):
@@ -783,6 +799,7 @@ def _candidate(one: Candidate, axes: Axes) -> CandidateJson:
         "settings": {names[name]: value for name, value in one.settings.items()},
         "untestable_reason": one.untestable_reason,
         "cannot_represent": one.cannot_represent,
+        "probability": one.probability,
     }
 
 
@@ -853,6 +870,7 @@ def _added(found: Discovery, one: Added) -> AddedJson:
         "holdout_rmse_after": one.holdout_after,
         "same_as": list(one.same_as),
         "supported_by": list(one.supported_by),
+        "probability": one.probability,
     }
 
 
@@ -1018,6 +1036,9 @@ def sentences(found: Discovery) -> list[str]:
         if one.same_as:
             rivals = all_of([in_sentence(effect_title(name)) for name in one.same_as])
             told.append(f"These recordings cannot tell {in_sentence(effect_title(one.name))} from {rivals}.")
+        if one.probability is not None:
+            this = "one of these" if one.same_as else in_sentence(effect_title(one.name))
+            told.append(f"That {this} is missing is {in_percent(one.probability)} probable.")
     if found.parameters_outside_tolerance:
         outside = all_of([_beside_file(found, path) for path in found.parameters_outside_tolerance])
         whose = "its" if len(found.parameters_outside_tolerance) == 1 else "their"

@@ -361,6 +361,7 @@ def calibrate(
     signals: Mapping[str, float] | None = None,
     start: Mapping[str, float] | None = None,
     on_progress: Callable[[int], None] | None = None,
+    final: bool = True,
 ) -> Calibration:
     """Fits the free parameters ("section.name", "effects.name.parameter", or k1…k8), and each window's start.
 
@@ -370,6 +371,7 @@ def calibrate(
     Two starts or more; the best is kept, and the fit has converged when it ended before its limit and two agree.
     start: x by name, from an earlier fit, from which alone this one begins.
     on_progress is told the evaluations so far, and may raise to stop.
+    final: whether its intervals are told; else directions that are hardly known are not simulated for them.
     Raises InputError for a parameter that does not exist or has no tolerance.
     """
     problem = problem_of(model, floors, free=free, k=k, signals=signals)
@@ -380,7 +382,7 @@ def calibrate(
     scale = max(1.0, chi2)
     if chi2 > _MISFIT:  # errors of a wrong model last
         scale *= max(1.0, CORRELATED_S / min(one.block_s for one in floors))
-    jacobian = measured(problem, x, fit.jacobian, scale)
+    jacobian = measured(problem, x, fit.jacobian, scale) if final else fit.jacobian
     covariance = covariance_of(jacobian) * scale
     fitted_k = problem.k(x)
     actuator = replace(model.actuator.varied(problem.parameters(x)), faults=named(fitted_k))
@@ -404,7 +406,7 @@ def calibrate(
         room=(problem.low - x, problem.high - x),
         evaluations=search.evaluations,
         confounded=_confounded(problem.unknowns, covariance),
-        identifiable=_products(problem, x, covariance, jacobian[: problem.values], fit.residual),
+        identifiable=_products(problem, x, covariance, jacobian[: problem.values], fit.residual) if final else (),
         free=chosen,
     )
 

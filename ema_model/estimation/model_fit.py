@@ -199,8 +199,12 @@ def fit(
     tell: Callable[[str], None] | None = None,
     faults: tuple[str, ...] = (),
     held: tuple[str, ...] = (),
+    final: bool = True,
 ) -> Fit:
-    """Calibrates the base parameters but those held, those of the actuator's effects, and these faults together."""
+    """Calibrates the base parameters but those held, those of the actuator's effects, and these faults together.
+
+    final: as `calibrate` has it.
+    """
     plant = data.plant(actuator)
     calibration = calibrate(
         plant,
@@ -209,6 +213,7 @@ def fit(
         signals=data.signals,
         start=start,
         on_progress=None if tell is None else lambda evaluations: tell(f"fitting (simulations: {evaluations})"),
+        final=final,
     )
     names = [*calibration.parameters, *calibration.starts]
     starts = {name: float(x) for name, x in zip(names, calibration.x)}
@@ -239,7 +244,7 @@ def holdout_change(data: Data, one: Fit, other: Fit) -> float:
 
 
 def _with_starts(data: Data, plant: Model) -> Sequence[Signals]:
-    return calibrate(plant, data.floors, free=(), signals=data.signals, start={}).signals
+    return calibrate(plant, data.floors, free=(), signals=data.signals, start={}, final=False).signals
 
 
 def resimulated(data: Data, actuator: Actuator) -> tuple[float, dict[str, float], dict[str, float]]:

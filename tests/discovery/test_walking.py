@@ -26,7 +26,7 @@ def walk_of(monkeypatch, ranked, floors=50.0, simulates=True, fault=0.0):
     )
     current = SimpleNamespace(chi2=1000.0, plant=SimpleNamespace(simulates_commands=simulates))
     story = SimpleNamespace(data=None, current=current, left=lambda: None, ranked=lambda names, left: ranked)
-    return walking._Walk(story, lambda text: None, None, 3)
+    return walking.Walk(story, lambda text: None, None, 3)
 
 
 DELAY, COGGING = Candidate("computation_delay", 550.0, {}), Candidate("cogging_torque", 600.0, {})
@@ -96,8 +96,8 @@ def test_a_test_is_sought_only_for_rivals_of_the_last_model(added, alike):
         Trial(Candidate(name, 1.0, {}), {}, SimpleNamespace(), 1.0)
         for name in ("pendulum_load", "hinge_moment", "friction_zone")
     ]
-    assert [one.candidate.name for one in walking._still_alike(story, rivals)] == alike
-    assert walking._still_alike(story, []) == []
+    assert [one.candidate.name for one in walking.still_alike(story, rivals)] == alike
+    assert walking.still_alike(story, []) == []
 
 
 def test_candidates_are_scored_once_for_a_model(monkeypatch):
@@ -146,7 +146,7 @@ def test_friction_that_falls_is_tried_from_where_its_whole_change_comes_nearest(
         Fingerprint("stribeck_friction", {"speed_rad_s": 0.3}, 4.0 * shape[:, None]),
         Fingerprint("hinge_moment", {"stiffness_Nm_rad": 1.0}, 5.0 * shape[:, None]),
     ]
-    story = SimpleNamespace(_prints=prints, current=SimpleNamespace(residual=-5.0 * shape), trial=lambda one, tell: one)
+    story = SimpleNamespace(prints=prints, current=SimpleNamespace(residual=-5.0 * shape), trial=lambda one, tell: one)
     ranked = [Candidate("hinge_moment", 9.0, {}), Candidate("stribeck_friction", 0.0, {"speed_rad_s": 3.0})]
     [tried] = Story.tried_whole(story, ranked, lambda text: None)
     assert tried.name == "stribeck_friction" and tried.settings == {"speed_rad_s": 0.3}

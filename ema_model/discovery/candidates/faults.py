@@ -98,8 +98,24 @@ def without_fault(data: Data, current: Fit, name: str, tell: Callable[[str], Non
 @lru_cache(maxsize=4)  # a step is ranked, walked and looked at by it
 def scored_faults(data: Data, current: Fit) -> tuple[ScoredFault, ...]:
     """Each fault that is not in the model yet, the most telling first; of other actuators none."""
+    known = to_vector(current.calibration.k)
+    jacobian, gram = movable(current)
+    best: dict[tuple[str, ...], ScoredFault] = {}
+    for names, step, columns in fault_columns(data, current):
+        own = beyond_of(jacobian, gram, columns)
+        one = _at(known, names, step, own, *amounts_of(current, columns, jacobian, gram, own))
+        if names not in best or one.drop > best[names].drop:
+            best[names] = one
+    return tuple(sorted(best.values(), key=lambda one: -one.drop))
+
+
+def fault_columns(data: Data, current: Fit) -> list[tuple[tuple[str, ...], float, Array]]:
+    """Of each fault that is not in the model yet: its k, a step of it, and what that changes, over the floor.
+
+    The changes are (values, 1), of an eccentricity (values, 2), as a vector.  Of other actuators there are none.
+    """
     if not current.actuator.has_reference_model:
-        return ()
+        return []
     left = [names for names in CAUSES if names[0] not in current.faults]
     known = to_vector(current.calibration.k)
     lanes, tried = [known], []
@@ -117,15 +133,7 @@ def scored_faults(data: Data, current: Fit) -> tuple[ScoredFault, ...]:
         for i in range(len(current.plant.windows))
     ]
     signals = np.nan_to_num(data.over_floor(current.plant, shown))
-    jacobian, gram = movable(current)
-    best: dict[tuple[str, ...], ScoredFault] = {}
-    for names, step, its in tried:
-        columns = (signals[its] - signals[0]).T
-        own = beyond_of(jacobian, gram, columns)
-        one = _at(known, names, step, own, *amounts_of(current, columns, jacobian, gram, own))
-        if names not in best or one.drop > best[names].drop:
-            best[names] = one
-    return tuple(sorted(best.values(), key=lambda one: -one.drop))
+    return [(names, step, (signals[its] - signals[0]).T) for names, step, its in tried]
 
 
 def _at(

@@ -51,7 +51,7 @@ def tried(
     """The effects in the model, refitted together with all that it holds."""
     best = _refitted(data, current, effects, current.starts, tell)
     if best.chi2 > current.chi2:  # it began too strong to find back
-        faint = {name: _weakened(find(name, current.actuator.axes), settings) for name, settings in effects.items()}
+        faint = {name: weakened(find(name, current.actuator.axes), settings) for name, settings in effects.items()}
         best = _better(best, _refitted(data, current, faint, current.starts, tell))
     best = _recentred(data, current, best, effects, tell)
     if best.error() > HALF * current.error() and is_near(current) and _is_strained(current):
@@ -71,7 +71,7 @@ def again(data: Data, current: Fit, trial: Trial, tell: Progress) -> Trial:
 def _recentred(data: Data, current: Fit, best: Fit, effects: Mapping[str, Mapping[str, float]], tell: Progress) -> Fit:
     """A refit that began anew from where its first guess held it back."""
     for _ in range(_RECENTRED):
-        if best.chi2 > current.chi2 - LEAST_BIC or not _held_back(best, effects):
+        if best.chi2 > current.chi2 - LEAST_BIC or not held_back(best, effects):
             break
         other = _refitted(data, current, settings_in(best, effects), current.starts, tell)
         if other.chi2 > best.chi2:
@@ -101,7 +101,7 @@ def _sized(
     for _ in range(_RECENTRED):
         found = _refitted(data, current, effects, _AS_IN_THE_FILE, tell, held)
         effects = settings_in(found, effects)
-        if not _held_back(found, effects):
+        if not held_back(found, effects):
             break
     return effects
 
@@ -156,7 +156,7 @@ def _refitted(
     return fit(data, actuator, start, tell, current.faults, held)
 
 
-def _held_back(found: Fit, effects: Mapping[str, Mapping[str, float]]) -> bool:
+def held_back(found: Fit, effects: Iterable[str]) -> bool:
     """Whether a parameter of the effects ended so far from the guess that it began with that this holds it back."""
     for name in effects:
         for parameter in find(name, found.actuator.axes).parameters:
@@ -169,7 +169,7 @@ def _held_back(found: Fit, effects: Mapping[str, Mapping[str, float]]) -> bool:
     return False
 
 
-def _weakened(effect: Effect, settings: Mapping[str, float]) -> dict[str, float]:
+def weakened(effect: Effect, settings: Mapping[str, float]) -> dict[str, float]:
     first = effect.parameters[0]
     return {**settings, first.name: max(first.low, _FAINT * settings[first.name])}
 

@@ -155,7 +155,7 @@ def _scored(
     if one.frees:
         return _beyond_the_file(found, one, effect, amounts, float(toward @ amounts))
     first = effect.parameters[0]
-    reason = unseen(energy, _strong(found, effect) / one.settings[first.name])
+    reason = unseen(energy, strong_case(found, effect) / one.settings[first.name])
     given = 0.0
     if freed:
         amounts, energy, toward, given = freed[:4]
@@ -178,7 +178,7 @@ def _scored(
     return Candidate(one.name, 0.0 if reason else max(0.0, drop), settings, reason)
 
 
-def _strong(found: Fit, effect: Effect) -> float:
+def strong_case(found: Fit, effect: Effect) -> float:
     """A strong case of an effect's first parameter; of one that counts by a signal's size, what this machine may have.
 
     The library's own machine has other currents, and other torques: a greater motor's teeth pull as much harder.

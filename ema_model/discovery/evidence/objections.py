@@ -49,7 +49,7 @@ def against(data: Data, before: Fit, after: Fit, keys: Sequence[str], settled: C
     long as a fit, so that it is asked for last.
     """
     return (
-        next((reason for key in keys if (reason := _unmeasured(data, key) or _within(before, after, key))), "")
+        next((reason for key in keys if (reason := unmeasured(data, key) or within(before, after, key))), "")
         or _worse(data, before, after)
         or _little(data, before, after)
         or _needless(data, before, keys)
@@ -82,8 +82,8 @@ def still_against(data: Data, base: Fit, found: Fit, key: str) -> str:
 def _of_its_values(data: Data, base: Fit, before: Fit, after: Fit, key: str) -> str:
     return (
         _bent(before, after, key)
-        or _implausible(after, key)
-        or _unsteady(data, after, key)
+        or implausible(after, key)
+        or unsteady(data, after, key)
         or _may_be_none(data, base, after, key)
     )
 
@@ -120,7 +120,7 @@ def ratio(data: Data, found: Fit) -> float:
     return floor_ratio(data.before_fit, found.plant, found.calibration.signals)
 
 
-def _unmeasured(data: Data, key: str) -> str:
+def unmeasured(data: Data, key: str) -> str:
     """A sensor's error, where nothing was recorded of that sensor."""
     effect = find(catalogue_name(key))
     signals = [_READINGS[place.__name__] for place in effect.places if place.__name__ in _READINGS]
@@ -129,7 +129,7 @@ def _unmeasured(data: Data, key: str) -> str:
     return ""
 
 
-def _within(before: Fit, after: Fit, key: str) -> str:
+def within(before: Fit, after: Fit, key: str) -> str:
     """An effect of the file that stays where the file has it."""
     file = before.actuator
     if key not in file.effects:
@@ -162,7 +162,7 @@ def _bent(before: Fit, after: Fit, key: str) -> str:
     return ""
 
 
-def _implausible(after: Fit, key: str) -> str:
+def implausible(after: Fit, key: str) -> str:
     """A value that no such part has."""
     values = after.calibration.actuator.effects[key]
     for parameter in find(catalogue_name(key)).parameters:
@@ -233,7 +233,7 @@ def _strained(data: Data, before: Fit, after: Fit) -> str:
     return path and f"a true model may leave as much, and with it the {_title(after, path)} stands at its bound"
 
 
-def _unsteady(data: Data, after: Fit, key: str) -> str:
+def unsteady(data: Data, after: Fit, key: str) -> str:
     apart = disagreement(data, after, key)
     if apart is None:
         return ""

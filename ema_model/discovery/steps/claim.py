@@ -42,10 +42,10 @@ def claimed(story: Story, accepted: Sequence[Trial], tell: Progress) -> Claim | 
         others += [
             trial for trial in left if trial is not best and trial not in others and _one_motion(story, best, trial)
         ]
-        others = _without_series(others)
+        others = without_series(others)
         further = _further(story, best, tell)
         more, reason = None if further is None else further.trial, ""
-        apart = _of_other_parts(best, others)
+        apart = of_other_parts(best, others)
         law = None if further is None else _better_law(story, more or best, by_orders)
         if len(apart) >= LARGEST_GROUP:
             reason = f"{len(apart)} others tell as much"
@@ -133,13 +133,13 @@ def _one_motion(story: Story, best: Trial, other: Trial) -> bool:
     return float(one @ two) > ONE_MOTION * float(np.linalg.norm(one) * np.linalg.norm(two))
 
 
-def _without_series(others: Sequence[Trial]) -> list[Trial]:
+def without_series(others: Sequence[Trial]) -> list[Trial]:
     """Those of which no term of the series is among them: what a constant does, an arm's weight does at some angle."""
     names = {trial.candidate.name for trial in others}
     return [trial for trial in others if names.isdisjoint(find(trial.candidate.name).terms)]
 
 
-def _of_other_parts(best: Trial, others: Sequence[Trial]) -> list[Trial]:
+def of_other_parts(best: Trial, others: Sequence[Trial]) -> list[Trial]:
     """Those that are of another part than the best: a drive's delays are alike, and any of them names the drive.
 
     What has the best as a term of its series is the same, seen over a short travel.

@@ -62,7 +62,7 @@ class Story:
     disagreements: list[Contradiction] = field(default_factory=list)  # of held-out recordings
     turned: list[Contradiction] = field(default_factory=list)  # the same of those whose encoder was put right
     _calm: dict[Fit, Fit] = field(default_factory=dict)  # fits by those that they were settled from
-    _prints: list[Fingerprint] = field(default_factory=list)
+    prints: list[Fingerprint] = field(default_factory=list)
 
     @property
     def base(self) -> Fit:
@@ -113,10 +113,10 @@ class Story:
         orders = (left or self.left()).orders
         if actuator.axes.motor == "linear":
             orders = orders[:_MOST_PITCHES]  # the rest are there to tell what noise is
-        self._prints = fingerprints(self.data, self.current, wanted, orders)
-        self._prints += of_the_file(self.current, [name for name in given if not names or name in names])
+        self.prints = fingerprints(self.data, self.current, wanted, orders)
+        self.prints += of_the_file(self.current, [name for name in given if not names or name in names])
         left_out = [Candidate(name, 0.0, {}, cannot_represent=reason) for name, reason in barred.items()]
-        return scored(self.current, self._prints) + left_out
+        return scored(self.current, self.prints) + left_out
 
     def signatures(self, ranked: Sequence[Candidate]) -> dict[str, Array]:
         """What each candidate, of the last `ranked`, would take from what is measured less the model.
@@ -124,7 +124,7 @@ class Story:
         (values,), over the floor, at the strength that suits best; only what the calibration cannot do as well.
         """
         prints = {
-            one.name: [p for p in self._prints if p.name == one.name and p.settings.get("order") == order]
+            one.name: [p for p in self.prints if p.name == one.name and p.settings.get("order") == order]
             for one in ranked
             for order in (one.settings.get("order"),)
         }
@@ -159,7 +159,7 @@ class Story:
         """
         nearest = []
         for candidate in ranked:
-            prints = [one for one in self._prints if one.name == candidate.name and find(one.name).at_speeds]
+            prints = [one for one in self.prints if one.name == candidate.name and find(one.name).at_speeds]
             if prints and not candidate.obstacle:
                 best = min(prints, key=lambda one: float(np.sum((self.current.residual + one.columns[:, 0]) ** 2)))
                 nearest.append(replace(candidate, settings=best.settings))
@@ -234,6 +234,13 @@ class Story:
         ]
         self.steps[-1] = replace(last, added=tuple(added))
 
+    def told_probable(self, probability: float) -> None:
+        """How probable it is that what was added last, or what cannot be told from it, is missing."""
+        last = self.steps[-1]
+        if last.added:
+            added = (*last.added[:-1], replace(last.added[-1], probability=probability))
+            self.steps[-1] = replace(last, added=added)
+
     def without(self, key: str, tell: Progress = lambda text: None, found: Fit | None = None) -> Fit:
         """The last model, or another one that was found, without one of its effects or faults, refitted."""
         found = found or self.current
@@ -294,7 +301,7 @@ class Story:
         """Goes on as another story of the same recordings, by another model; its warnings come last."""
         self.data, self.held, self.steps = other.data, other.held, other.steps
         self.turned = other.turned
-        self.ties, self._calm, self._prints = other.ties, other._calm, other._prints
+        self.ties, self._calm, self.prints = other.ties, other._calm, other.prints
         self.refused = {**self.refused, **other.refused}
         self.warnings += other.warnings
 

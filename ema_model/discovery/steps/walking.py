@@ -27,6 +27,7 @@ from ema_model.discovery.steps.turned import put_right
 from ema_model.discovery.steps.weighed_again import fault_instead, near, weigh_again
 from ema_model.effects import CATALOGUE, find
 from ema_model.estimation.model_fit import Fit
+from ema_model.faults import NAMES as FAULTS
 
 Progress = Callable[[str], None]
 
@@ -43,16 +44,22 @@ class Walked:
 
 
 def walk(
-    story: Story, tell: Progress = lambda text: None, *, candidates: Sequence[str] | None = None, most_effects: int = 3
+    story: Story,
+    tell: Progress = lambda text: None,
+    *,
+    candidates: Sequence[str] | None = None,
+    most_effects: int = 3,
+    engine: type[Walk] | None = None,
 ) -> Walked:
     """Goes on by itself from where a story stands: adds what pays, takes out what became idle, draws what is unknown.
 
     Where a closed loop is left unexplained, inverse dynamics is asked as well, and takes over if the controller is to
     blame, or if the loop names nothing, or little of what is left.  tell is told after each step, too, and may raise
-    to stop; the story then stands at its last whole step.
+    to stop; the story then stands at its last whole step.  engine: how each of them goes on.
     """
-    own = _Walk(story, tell, candidates, most_effects)
-    beside = _Beside(story, tell, candidates, most_effects)
+    engine = engine or Walk
+    own = engine(story, tell, candidates, most_effects)
+    beside = _Beside(story, tell, candidates, most_effects, engine)
     left = max(FAR, LOOP_TOLD * ratio(story.data, story.base))
     # A loop whose drive is another one is walked in vain; one that lacks a limit, which is not straight, tells so
     # only once that is refitted.
@@ -83,7 +90,7 @@ def walk(
     return walked
 
 
-class _Walk:
+class Walk:
     """A story that goes on step by step."""
 
     def __init__(self, story: Story, tell: Progress, candidates: Sequence[str] | None, most_effects: int) -> None:
@@ -106,17 +113,17 @@ class _Walk:
     def suspects_drive(self) -> bool:
         """Whether the loop is far off, and what would tell most of it is of the drive."""
         best = self._best()
-        return best is not None and _of_drive(best)
+        return best is not None and of_drive(best)
 
     def drive_leaves(self) -> float:
         """What the best of the drive's candidates leaves, refitted, in floors."""
         ranked = self._scored()[1]
         promising = self.story.promising(ranked, _REFITTED_SHARE, _MOST_REFITTED)
         for one in promising:
-            if _of_drive(one):
+            if of_drive(one):
                 self._tried.append(self.story.trial(one, self._tell))
         if not self._tried:  # a score takes for straight what is not
-            self._tried += self.story.tried_whole([one for one in ranked if _of_drive(one)], self._tell)
+            self._tried += self.story.tried_whole([one for one in ranked if of_drive(one)], self._tell)
         return min((ratio(self.story.data, trial.fit) for trial in self._tried), default=math.inf)
 
     def go(self) -> None:
@@ -137,9 +144,9 @@ class _Walk:
         drop_doubtful(story, tell)
         unknown = story.left().explanation
         if unknown is not None and not named_in(story):
-            unknown = _with_curve(story, self._curve, unknown, tell)
+            unknown = with_curve(story, self._curve, unknown, tell)
         story.settle(tell)  # last: beside a settled model any refit falls that only goes back to the sensors' noise
-        return Walked(self._first, _still_alike(story, self._rivals), unknown)
+        return Walked(self._first, still_alike(story, self._rivals), unknown)
 
     def _begin_with(self, fault: Trial) -> None:
         """Walks anew beside a fault in whose place an effect stood."""
@@ -215,8 +222,11 @@ class _Walk:
 class _Beside:
     """Inverse dynamics beside a story: asked where it is wanted, and walked once."""
 
-    def __init__(self, story: Story, tell: Progress, candidates: Sequence[str] | None, most_effects: int) -> None:
+    def __init__(
+        self, story: Story, tell: Progress, candidates: Sequence[str] | None, most_effects: int, engine: type[Walk]
+    ) -> None:
         self._story, self._tell, self._names, self._most = story, tell, candidates, most_effects
+        self._engine = engine
         self._opinion: Opinion | None = None
         self._walked: Walked | None = None
 
@@ -250,7 +260,7 @@ class _Beside:
     def _ended(self) -> Opinion | None:
         opinion = self.asked()
         if opinion is not None and self._walked is None:
-            self._walked = _Walk(opinion.story, self._tell, self._names, self._most).ended()
+            self._walked = self._engine(opinion.story, self._tell, self._names, self._most).ended()
         return opinion
 
     def _bends(self) -> bool:
@@ -267,7 +277,7 @@ def _leading(trials: Sequence[Trial], accepted: Sequence[Trial]) -> int:
     return trials.index(accepted[0]) if accepted else len(trials) - 1
 
 
-def _with_curve(story: Story, curve: Trial | None, unknown: Explanation, tell: Progress) -> Explanation:
+def with_curve(story: Story, curve: Trial | None, unknown: Explanation, tell: Progress) -> Explanation:
     """Adds the curve of what is unknown, and tells what it stands for.
 
     Parameters that only bent toward it go back: the curve is drawn beside the calibrated model, if one can be.
@@ -290,7 +300,7 @@ def _with_curve(story: Story, curve: Trial | None, unknown: Explanation, tell: P
     return unknown
 
 
-def _still_alike(story: Story, rivals: Sequence[Trial]) -> list[Trial]:
+def still_alike(story: Story, rivals: Sequence[Trial]) -> list[Trial]:
     """An effect and its rivals, where the last model still has it and cannot tell it from them."""
     known = {one.name: one.same_as for one in story.added}
     names = known.get(rivals[0].candidate.name, ()) if rivals else ()
@@ -298,8 +308,8 @@ def _still_alike(story: Story, rivals: Sequence[Trial]) -> list[Trial]:
     return [rivals[0], *alike] if alike else []
 
 
-def _of_drive(one: Candidate) -> bool:
-    return find(one.name).family == "drive"
+def of_drive(one: Candidate) -> bool:
+    return one.name not in FAULTS and find(one.name).family == "drive"
 
 
 def named_in(story: Story) -> list[str]:

@@ -26,6 +26,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     options.add_fit(parser, "the discovery")
     parser.add_argument("--signals", choices=("current", "all"), default="all", help="what is fitted")
     parser.add_argument("--max-effects", type=whole(0, 100), default=3, metavar="N", help="at most so many are added")
+    parser.add_argument(
+        "--engine",
+        choices=("steps", "evidence"),
+        default="steps",
+        help="refit what fits best and ask what speaks against it, or (new) compare how probable models are",
+    )
     options.add_open_loop(parser)
     options.add_seed(parser)
 
@@ -62,6 +68,7 @@ def run(arguments: argparse.Namespace) -> int:
                 holdout=held,
                 signals=signals,
                 most_effects=arguments.max_effects,
+                engine=arguments.engine,
                 on_progress=progress.show,
                 stop=answer.is_interrupted,
             )

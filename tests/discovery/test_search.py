@@ -1,0 +1,138 @@
+"""The search by one evidence: its algebra, and that it names what is hidden and nothing else."""
+
+import numpy as np
+import pytest
+from support.hidden_effects import ACTUATOR, SINE, recorded
+
+from ema_model.discovery import as_dict, discover
+from ema_model.discovery.search.evidence import Unknowns, evidence_of, gains_of
+from ema_model.errors import InputError
+from ema_model.estimation.noise import PIECE, NoiseModel
+
+_COUNT = 6 * PIECE
+
+
+def _unknowns(columns, sigma=1.0, low=-np.inf, high=np.inf, mean=0.0):
+    return Unknowns(columns, *(np.full(columns.shape[1], float(one)) for one in (mean, sigma, low, high)))
+
+
+@pytest.fixture
+def made():
+    """The noise model, white noise, the model's own columns and those of two Terms, all as coefficients."""
+    rng = np.random.default_rng(7)
+    noise = NoiseModel.of([("current_A", slice(0, _COUNT))])
+    time = np.linspace(0.0, 1.0, _COUNT)
+    own = noise.coefficients(np.stack([np.ones(_COUNT), np.sign(np.sin(9.0 * time))], axis=1))
+    terms = [noise.coefficients(np.sin(w * time)[:, None]) for w in (60.0, 140.0)]
+    return noise, noise.coefficients(rng.standard_normal(_COUNT)), own, terms
+
+
+def test_a_term_that_is_there_makes_the_recordings_more_probable_and_its_amount_is_found(made):
+    noise, white, own, (term, other) = made
+    residual = white - 1.5 * term[:, 0] + 0.7 * own[:, 1]
+    plain = evidence_of(noise, residual, _unknowns(own))
+    there = evidence_of(noise, residual, _unknowns(own).beside([_unknowns(term, 5.0)]))
+    absent = evidence_of(noise, residual, _unknowns(own).beside([_unknowns(other, 5.0)]))
+    assert there.log - plain.log > 60.0
+    assert there.amounts[-1] == pytest.approx(1.5, abs=0.15)
+    assert there.amounts[1] == pytest.approx(-0.7, abs=0.15)
+    assert absent.log < plain.log + 2.0
+
+
+def test_a_term_that_is_not_there_costs_what_is_known_of_it_beforehand(made):
+    noise, white, own, (term, _) = made
+    plain = evidence_of(noise, white, _unknowns(own)).log
+    costs = [plain - evidence_of(noise, white, _unknowns(own).beside([_unknowns(term, s)])).log for s in (1.0, 10.0)]
+    assert 1.0 < costs[0] < costs[1]
+    assert costs[1] - costs[0] == pytest.approx(np.log(10.0), abs=0.2)  # ten times as much room, a tenth as probable
+
+
+def test_two_terms_of_the_same_columns_are_as_probable(made):
+    noise, white, own, (term, _) = made
+    residual = white - 1.5 * term[:, 0]
+    one, other = (
+        evidence_of(noise, residual, _unknowns(own).beside([_unknowns(scale * term, 5.0 / abs(scale))])).log
+        for scale in (1.0, -3.0)
+    )
+    assert one == pytest.approx(other, abs=1e-3)
+
+
+def test_an_amount_keeps_to_its_bounds_and_then_tells_nothing(made):
+    noise, white, own, (term, _) = made
+    residual = white + 1.5 * term[:, 0]  # it would have to be negative
+    plain = evidence_of(noise, residual, _unknowns(own)).log
+    found = evidence_of(noise, residual, _unknowns(own).beside([_unknowns(term, 5.0, low=0.0)]))
+    assert found.amounts[-1] == 0.0
+    assert found.log < plain
+
+
+def test_gains_by_one_step_have_the_order_of_the_whole(made):
+    noise, white, own, (term, other) = made
+    residual = white - 0.2 * term[:, 0]
+    plain = evidence_of(noise, residual, _unknowns(own))
+    its = [_unknowns(one, 5.0) for one in (term, other)]
+    gains = gains_of(noise, plain, _unknowns(own), its)
+    whole = [evidence_of(noise, residual, _unknowns(own).beside([one])).log - plain.log for one in its]
+    assert 0.4 * whole[0] < gains[0] < whole[0] + 1.0
+    assert gains[1] == pytest.approx(whole[1], abs=1.5)
+    assert gains[1] < 0.0 < gains[0]
+
+
+def test_unknowns_can_be_left_out(made):
+    _, _, own, (term, other) = made
+    whole = _unknowns(own).beside([_unknowns(term, 2.0), _unknowns(other, 3.0)])
+    left = whole.without([1, 2])
+    assert left.sigma.tolist() == [1.0, 3.0]
+    assert np.array_equal(left.columns, np.hstack([own[:, :1], other]))
+
+
+# --- discoveries by it, of recordings that the three-phase model made -------------------------------------------------
+
+AMONG = ("cogging_torque", "constant_load", "current_sensor_bias", "stribeck_friction", "torque_ripple")
+COMMANDS = [("chirp", {}, 0.5), SINE]
+
+
+def _found(effects, among=AMONG):
+    held = recorded(41, commands=[("sine", {"amplitude_rad": 0.02, "frequency_Hz": 5}, 0.5)], effects=effects)
+    fitted = recorded(41, commands=COMMANDS, effects=effects)
+    return discover(fitted, ACTUATOR, holdout=held, candidates=among, engine="evidence")
+
+
+def test_a_hidden_effect_is_named_with_how_probable_it_is():
+    found = _found({"cogging_torque": {"amplitude_Nm": 0.012, "phase_rad": 0.7}}, among=AMONG[::4])
+    assert found.verdict == "effects_found" and [one.name for one in found.effects] == ["cogging_torque"]
+    assert found.effects[0].probability == pytest.approx(1.0, abs=0.01)
+    assert found.effects[0].parameters["amplitude_Nm"].value == pytest.approx(0.012, rel=0.1)
+    assert found.effects[0].chosen["order"] == 12.0 and found.ladder[-1].rmse < 1.1
+    document = as_dict(found)
+    assert document["effects"][0]["probability"] == found.effects[0].probability
+    probable = [one["probability"] for one in document["candidates"]]
+    assert probable == sorted(probable, reverse=True) and sum(probable) < 1.0 + 1e-9
+    assert "That cogging torque is missing is > 99.9 % probable." in str(found)
+
+
+@pytest.mark.long
+def test_nothing_is_named_where_nothing_is_hidden():
+    found = _found(None)
+    assert found.verdict == "adequate" and not found.effects
+    assert all(one.probability < 0.5 for one in found.candidates)
+
+
+@pytest.mark.long
+def test_what_cannot_be_told_apart_is_one_group():
+    found = _found({"constant_load": {"torque_Nm": 3.0}})
+    assert {found.effects[0].name, *found.effects[0].same_as} == {"constant_load", "current_sensor_bias"}
+    assert found.effects[0].probability > 0.99
+
+
+@pytest.mark.long
+def test_two_effects_are_added_one_after_the_other():
+    hidden = {"cogging_torque": {"amplitude_Nm": 0.012, "phase_rad": 0.7}, "stribeck_friction": {"speed_rad_s": 10.0}}
+    found = _found(hidden)
+    assert {one.name for one in found.effects} == {*hidden}
+    assert found.ladder[-1].rmse < 1.1 and found.ladder[-1].holdout_rmse < 1.1
+
+
+def test_an_engine_that_is_not_there_is_refused():
+    with pytest.raises(InputError, match="no engine 'evidenc'; there are steps, evidence; did you mean 'evidence'"):
+        discover(recorded(41, commands=COMMANDS[:1]), ACTUATOR, engine="evidenc")

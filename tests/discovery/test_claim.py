@@ -250,5 +250,5 @@ def test_of_an_effect_and_a_term_of_its_series_that_tells_as_much_it_is_the_term
     ]
     best, others = claim._chosen(SimpleNamespace(data=None, held=None, current=None), trials)
     assert best.candidate.name == first and len(others) == (short_of < 10.0)
-    assert claim._of_other_parts(trials[1], trials[:1]) == [], "the series is no other cause than its term"
-    assert claim._without_series(trials) == trials[1:]
+    assert claim.of_other_parts(trials[1], trials[:1]) == [], "the series is no other cause than its term"
+    assert claim.without_series(trials) == trials[1:]

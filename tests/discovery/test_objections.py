@@ -98,7 +98,7 @@ def test_a_single_recording_is_judged_by_its_halves():
 )
 def test_values_that_no_such_part_has_are_not_claimed(name, settings, said):
     found = fitted([1.0, 1.0], settings=settings, path=f"effects.{name}.{next(iter(settings))}")
-    reason = objections._implausible(found, name)
+    reason = objections.implausible(found, name)
     assert (said in reason) if said else not reason
 
 
@@ -110,11 +110,11 @@ def test_a_parameter_at_its_bound_is_no_claim():
 
 def test_a_sensor_that_was_not_recorded_has_no_bias():
     blind = SimpleNamespace(measurements=[{"user_position_rad": 0}])
-    assert "not recorded" in objections._unmeasured(blind, "current_sensor_bias")
-    assert not objections._unmeasured(blind, "position_sensor_bias") and not objections._unmeasured(
+    assert "not recorded" in objections.unmeasured(blind, "current_sensor_bias")
+    assert not objections.unmeasured(blind, "position_sensor_bias") and not objections.unmeasured(
         DATA, "current_sensor_bias"
     )
-    assert not objections._unmeasured(blind, "cogging_torque_2")
+    assert not objections.unmeasured(blind, "cogging_torque_2")
 
 
 def test_what_takes_nothing_away_within_the_tolerances_is_not_claimed(monkeypatch):

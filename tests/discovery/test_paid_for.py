@@ -100,9 +100,9 @@ def arm(moment_Nm: float, file: bool = True):
 
 
 def test_an_effect_of_the_file_is_claimed_beyond_its_tolerance_alone():
-    assert "within the file's tolerances" in objections._within(*arm(0.55), "pendulum_load")
-    assert not objections._within(*arm(0.57), "pendulum_load")
-    assert not objections._within(*arm(0.55, file=False), "pendulum_load")
+    assert "within the file's tolerances" in objections.within(*arm(0.55), "pendulum_load")
+    assert not objections.within(*arm(0.57), "pendulum_load")
+    assert not objections.within(*arm(0.55, file=False), "pendulum_load")
 
 
 def bound(z: float, at_bound: bool):

@@ -27,7 +27,7 @@ from ema_model.effects import find
 def test_iron_saturates_by_what_its_machine_draws(name, current_A, strong):
     signals = {"current_A": np.array([0.5, -1.0]) * current_A}
     found = SimpleNamespace(calibration=SimpleNamespace(signals=[signals]))
-    assert score._strong(found, find(name)) == pytest.approx(strong)
+    assert score.strong_case(found, find(name)) == pytest.approx(strong)
 
 
 @pytest.mark.parametrize("start", [0.15, 0.1, 0.07, 0.3])
@@ -56,4 +56,4 @@ def test_a_strong_case_is_as_strong_as_the_machine(torque_Nm, times):
     shown = [{"motor_torque_Nm": np.array([0.0, -torque_Nm])}]
     found = SimpleNamespace(calibration=SimpleNamespace(signals=shown, actuator=load_actuator()))
     cogging = find("cogging_torque")
-    assert score._strong(found, cogging) == pytest.approx(times * cogging.severities[2])
+    assert score.strong_case(found, cogging) == pytest.approx(times * cogging.severities[2])

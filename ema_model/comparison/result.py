@@ -131,7 +131,11 @@ class Comparison(InWords):
 
 # --- a comparison in words: its sentences, the errors, what explains them, the calibration ----------------------------
 
-_ELSEWHERE = 1.25  # times the quotient of rms error and rms floor, that an error over the floor must be from it
+FLOOR_NOTE = (
+    "The floor is what a perfect model would leave: the sensors' noise, and what the model leaves out on "
+    "purpose (the inverter's switching). The error over the floor is that of each moment, whose floor may be lower or "
+    "higher than its rms; it is green up to what nine of ten true models leave."
+)
 FREE_NOTE = (
     "Free simulation: the model runs from the recordings' first state on, driven by the command alone, or in open loop "
     "by the recorded current, torque or force; nothing of the measured motion is fed back. Where the controller is not "
@@ -224,7 +228,7 @@ def _error_table(title: str, result: Comparison, of: Sequence[tuple[str, str, Si
         numbers = [number(shown.factor * one) for one in (*before, error.rmse, floor)]
         mean, share = number(shown.factor * error.mean_absolute), f"{number(100.0 * error.nrmse)} %"
         rows.append([name, *numbers, mean, share, over.text])
-        units.append(f"{shown.unit}{said}{_remark(error, floor)}")
+        units.append(f"{shown.unit}{said}{_remark(error)}")
         severities.append(over.severity if error.is_counted and not error.silent else "note")
     head = ["before"] if result.calibration is not None else []
     head += ["rms error", "floor", "mean |e|", "of range", "error / floor"]
@@ -274,16 +278,11 @@ def _has_floor(signal: str, error: SignalError) -> bool:
     return error.is_counted or error.noise_floor > _TOLD * least_noise(signal)
 
 
-def _remark(error: SignalError, floor: float) -> str:
-    """What is to be known of an error over the floor; floor: rms, in the signal's unit."""
+def _remark(error: SignalError) -> str:
+    """What is to be known of an error over the floor."""
     if error.silent:
         return ", uninformative"
-    if not error.is_counted:
-        return ", not counted"
-    share = error.in_floors.error * floor / error.rmse if error.rmse else math.nan
-    if share > _ELSEWHERE:
-        return ", most where its floor is low"
-    return ", most where its floor is high" if share < 1.0 / _ELSEWHERE else ""
+    return "" if error.is_counted else ", not counted"
 
 
 def details(result: Comparison, region: Region) -> str:

@@ -8,6 +8,7 @@ import numpy as np
 
 from ema_model.comparison.regions import Region, worst_moment
 from ema_model.comparison.result import (
+    FLOOR_NOTE,
     FREE_NOTE,
     Comparison,
     details,
@@ -63,12 +64,6 @@ class Answer(Section[Comparison]):
 
 # --- how far the model is from each signal, against the floor, before and after calibration ---------------------------
 
-_ERRORS_PER_SIGNAL_NOTE = (
-    "The floor is what a perfect model would leave: the sensors' noise, and what the model leaves out on "
-    "purpose (the inverter's switching). The error over the floor is that of each moment, whose floor may be lower or "
-    "higher than its rms; it is green up to what nine of ten true models leave."
-)
-
 
 class ErrorsPerSignal(Section[Comparison]):
     """A table over all recordings, that of the free simulation, and one for each signal by recording."""
@@ -78,7 +73,7 @@ class ErrorsPerSignal(Section[Comparison]):
 
     def body(self, subject: Comparison, figures: Figures) -> str:
         """Always there."""
-        parts = [with_remarks(errors(subject)), paragraph(_ERRORS_PER_SIGNAL_NOTE, "small")]
+        parts = [with_remarks(errors(subject)), paragraph(FLOOR_NOTE, "small")]
         parts.append(blocks(free_simulation(subject.simulation, subject.actuator.axes), FREE_NOTE))
         for name in subject.signals:
             if (told := errors_by_recording(subject, name)) is not None:

@@ -96,8 +96,8 @@ def test_a_test_is_sought_only_for_rivals_of_the_last_model(added, alike):
         Trial(Candidate(name, 1.0, {}), {}, SimpleNamespace(), 1.0)
         for name in ("pendulum_load", "hinge_moment", "friction_zone")
     ]
-    assert [one.candidate.name for one in walking.still_alike(story, rivals)] == alike
-    assert walking.still_alike(story, []) == []
+    assert [one.candidate.name for one in walking._still_alike(story, rivals)] == alike
+    assert walking._still_alike(story, []) == []
 
 
 def test_candidates_are_scored_once_for_a_model(monkeypatch):

@@ -80,13 +80,19 @@ def tried_faults(data: Data, current: Fit, ranked: Sequence[Candidate], tell: Ca
     return fits(refitted, strong[:_MOST_REFITTED], tell)
 
 
-def fault_trial(data: Data, current: Fit, candidate: Candidate, tell: Callable[[str], None]) -> Trial:
-    """A fault of the ranking in the model, refitted."""
+def fault_trial(
+    data: Data,
+    current: Fit,
+    candidate: Candidate,
+    tell: Callable[[str], None],
+    start: Mapping[str, float] | None = None,
+) -> Trial:
+    """A fault of the ranking in the model, refitted; start: x by name, from which alone its fit begins."""
     names = cause_of(candidate.name)
     at = [NAMES.index(name) for name in names]
     k = current.calibration.k.copy()
     k[at] = [candidate.settings.get(name, value) for name, value in zip(names, k[at])]
-    return _refitted(data, current, names, to_vector(k)[at], candidate, tell)
+    return _refitted(data, current, names, to_vector(k)[at], candidate, tell, start)
 
 
 def without_fault(data: Data, current: Fit, name: str, tell: Callable[[str], None]) -> Fit:
@@ -98,6 +104,8 @@ def without_fault(data: Data, current: Fit, name: str, tell: Callable[[str], Non
 @lru_cache(maxsize=4)  # a step is ranked, walked and looked at by it
 def scored_faults(data: Data, current: Fit) -> tuple[ScoredFault, ...]:
     """Each fault that is not in the model yet, the most telling first; of other actuators none."""
+    if not current.actuator.has_reference_model:
+        return ()
     known = to_vector(current.calibration.k)
     jacobian, gram = movable(current)
     best: dict[tuple[str, ...], ScoredFault] = {}
@@ -109,13 +117,14 @@ def scored_faults(data: Data, current: Fit) -> tuple[ScoredFault, ...]:
     return tuple(sorted(best.values(), key=lambda one: -one.drop))
 
 
-def fault_columns(data: Data, current: Fit) -> list[tuple[tuple[str, ...], float, Array]]:
+@lru_cache(maxsize=2)  # a step is scored by it in two ways
+def fault_columns(data: Data, current: Fit) -> Sequence[tuple[tuple[str, ...], float, Array]]:
     """Of each fault that is not in the model yet: its k, a step of it, and what that changes, over the floor.
 
     The changes are (values, 1), of an eccentricity (values, 2), as a vector.  Of other actuators there are none.
     """
     if not current.actuator.has_reference_model:
-        return []
+        return ()
     left = [names for names in CAUSES if names[0] not in current.faults]
     known = to_vector(current.calibration.k)
     lanes, tried = [known], []
@@ -133,22 +142,28 @@ def fault_columns(data: Data, current: Fit) -> list[tuple[tuple[str, ...], float
         for i in range(len(current.plant.windows))
     ]
     signals = np.nan_to_num(data.over_floor(current.plant, shown))
-    return [(names, step, (signals[its] - signals[0]).T) for names, step, its in tried]
+    return tuple((names, step, (signals[its] - signals[0]).T) for names, step, its in tried)
+
+
+def fault_at(known: Array, names: tuple[str, ...], step: float, amounts: Array) -> tuple[Array, dict[str, float]]:
+    """So many steps from what is known, (8,), as far as k may go: the fault's parts, as a vector, and its k."""
+    at = [NAMES.index(name) for name in names]
+    there = known[at] + step * amounts
+    there = there / max(1.0, math.hypot(*there)) if len(names) == 2 else np.clip(there, 0.0, 1.0)
+    vector = known.copy()
+    vector[at] = there
+    k = to_k(vector)
+    return there, {name: float(k[i]) for name, i in zip(names, at)}
 
 
 def _at(
     known: Array, names: tuple[str, ...], step: float, own: Array, amounts: Array, energy: Array, toward: Array
 ) -> ScoredFault:
     """The fault at these multiples of what its columns were made with, beyond what is known, as far as k may go."""
-    at = [NAMES.index(name) for name in names]
-    there = known[at] + step * amounts
-    there = there / max(1.0, math.hypot(*there)) if len(names) == 2 else np.clip(there, 0.0, 1.0)
-    amounts = (there - known[at]) / step
+    there, settings = fault_at(known, names, step, amounts)
+    amounts = (there - known[[NAMES.index(name) for name in names]]) / step
     drop = float(2.0 * amounts @ toward - amounts @ energy @ amounts)
-    vector = known.copy()
-    vector[at] = there
     reason = unseen(energy, _STRONG / step)
-    settings = {name: float(to_k(vector)[i]) for name, i in zip(names, at)}
     candidate = Candidate(names[0], 0.0 if reason else max(0.0, drop), settings, reason)
     return ScoredFault(names, there, drop, own @ amounts, candidate)
 
@@ -160,12 +175,17 @@ def _refitted(
     there: Array,
     candidate: Candidate,
     tell: Callable[[str], None],
+    start: Mapping[str, float] | None = None,
 ) -> Trial:
-    """The fault free beside the parameters, from where they are and from the file's values."""
+    """The fault free beside the parameters, from a start, or from where they are and from the file's values."""
     tell(f"trying the fault {' and '.join(names)}")
     unknowns = unknowns_of(current.actuator, names)
     guess = {u.name: float(value - u.nominal) / u.sigma for u, value in zip(unknowns, there)}
-    best = _better_start(data, current, guess, tell, (*current.faults, *names))
+    faults = (*current.faults, *names)
+    if start is None:
+        best = _better_start(data, current, guess, tell, faults)
+    else:
+        best = fit(data, current.actuator, {**start, **guess}, tell, faults, final=False)
     return Trial(candidate, {}, best, current.chi2 - best.chi2, names)
 
 

@@ -153,29 +153,47 @@ def _scored(
     amounts, energy, toward = amounts_of(found, one.columns, jacobian, gram, beyond)
     effect = find(one.name, found.actuator.axes)
     if one.frees:
-        return _beyond_the_file(found, one, effect, amounts, float(toward @ amounts))
+        return Candidate(one.name, max(0.0, float(toward @ amounts)), settings_at(found, one, amounts))
     first = effect.parameters[0]
     reason = unseen(energy, strong_case(found, effect) / one.settings[first.name])
     given = 0.0
     if freed:
         amounts, energy, toward, given = freed[:4]
-    settings = dict(one.settings)
-    linear = {first.name: settings[first.name]} | one.beside
+    linear = {first.name: one.settings[first.name]} | one.beside
     if len(amounts) == len(linear):
         own = {parameter.name: parameter for parameter in effect.parameters}
         ranges = [(own[name].low / value, own[name].high / value) for name, value in linear.items()]
         amounts = np.clip(amounts, *np.transpose(ranges))
         drop = given + float(2.0 * amounts @ toward - amounts @ energy @ amounts)
-        if first.low <= 0.0:  # otherwise the parameter is no amplitude
-            # A product of the two may come to stand an ulp beyond the range that the amounts keep.
-            settings |= {name: own[name].nearest(linear[name] * amount) for name, amount in zip(linear, amounts)}
-        elif amounts[0] < 0.0:
+        if first.low > 0.0 and amounts[0] < 0.0:
             drop = 0.0
     else:
         drop = given + float(toward @ amounts)
+    return Candidate(one.name, 0.0 if reason else max(0.0, drop), settings_at(found, one, amounts), reason)
+
+
+def settings_at(found: Fit, one: Fingerprint, amounts: Array) -> dict[str, float]:
+    """A fingerprint's settings where its columns are taken so many times, (columns,).
+
+    Of an effect of the file, amounts are steps of its parameters, in σ of their tolerances.
+    """
+    effect = find(one.name, found.actuator.axes)
+    own = {parameter.name: parameter for parameter in effect.parameters}
+    first = effect.parameters[0]
+    settings = dict(one.settings)
+    if one.frees:
+        for path, step in zip(one.frees, amounts):
+            name, sigma = path.rpartition(".")[2], found.actuator.tolerances[path].sigma
+            settings[name] = own[name].nearest(settings[name] + sigma * float(step))
+    elif len(amounts) == 1 + len(one.beside):
+        linear = {first.name: settings[first.name]} | one.beside
+        if first.low <= 0.0:  # otherwise the parameter is no amplitude
+            # A product of the two may come to stand an ulp beyond the range that the amounts keep.
+            settings |= {name: own[name].nearest(value * n) for (name, value), n in zip(linear.items(), amounts)}
+    else:
         settings[first.name] = first.nearest(settings[first.name] * math.hypot(*amounts))
         settings[effect.phase] = math.atan2(float(amounts[1]), float(amounts[0]))
-    return Candidate(one.name, 0.0 if reason else max(0.0, drop), settings, reason)
+    return settings
 
 
 def strong_case(found: Fit, effect: Effect) -> float:
@@ -196,13 +214,3 @@ def _greatest_torque(found: Fit) -> float:
     """What the motor gives at most, N·m; of a linear one N; 0 where neither torque nor current is known."""
     constant = found.calibration.actuator.value("motor.torque_constant_Nm_A")
     return max(greatest(found, "motor_torque_Nm"), abs(constant) * greatest(found, "current_A"))
-
-
-def _beyond_the_file(found: Fit, one: Fingerprint, effect: Effect, amounts: Array, drop: float) -> Candidate:
-    """An effect of the file at other values; amounts: steps of its parameters, in σ of their tolerances."""
-    settings = dict(one.settings)
-    of = {f"effects.{one.name}.{parameter.name}": parameter for parameter in effect.parameters}
-    for path, step in zip(one.frees, amounts):
-        parameter, sigma = of[path], found.actuator.tolerances[path].sigma
-        settings[parameter.name] = parameter.nearest(settings[parameter.name] + sigma * float(step))
-    return Candidate(one.name, max(0.0, drop), settings)

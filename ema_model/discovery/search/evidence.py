@@ -77,8 +77,7 @@ def evidence_of(noise: NoiseModel, residual: Array, unknowns: Unknowns, levels: 
         if posterior - last < _SETTLED:
             break
         last = posterior
-    narrowed = np.linalg.slogdet(normal)[1] - float(np.sum(np.log(precision)))
-    return Evidence(posterior - 0.5 * float(narrowed), amounts, left, levels)
+    return Evidence(posterior - 0.5 * _narrowed(normal, unknowns.sigma), amounts, left, levels)
 
 
 def evidence_at(noise: NoiseModel, residual: Array, unknowns: Unknowns, amounts: Array) -> tuple[float, float]:
@@ -88,12 +87,15 @@ def evidence_at(noise: NoiseModel, residual: Array, unknowns: Unknowns, amounts:
     """
     levels = noise.levels(residual)
     weighted = unknowns.columns * noise.weights(residual, levels)[:, None]
-    precision = unknowns.sigma**-2.0
-    normal = weighted.T @ unknowns.columns + np.diag(precision)
-    narrowed = np.linalg.slogdet(normal)[1] - float(np.sum(np.log(precision)))
+    normal = weighted.T @ unknowns.columns + np.diag(unknowns.sigma**-2.0)
     away = (amounts - unknowns.mean) / unknowns.sigma
     density = noise.log_likelihood(residual, levels) - 0.5 * float(away @ away)
-    return density - 0.5 * float(narrowed), density
+    return density - 0.5 * _narrowed(normal, unknowns.sigma), density
+
+
+def _narrowed(normal: Array, sigma: Array) -> float:
+    """Twice the logarithm of how many times smaller the volume is that the recordings leave of what was known."""
+    return float(np.linalg.slogdet(normal)[1]) + 2.0 * float(np.sum(np.log(sigma)))
 
 
 def gains_of(noise: NoiseModel, found: Evidence, unknowns: Unknowns, others: Sequence[Unknowns]) -> Array:
@@ -119,9 +121,9 @@ def gains_of(noise: NoiseModel, found: Evidence, unknowns: Unknowns, others: Seq
         left = found.residual + own @ amounts
         levels = noise.levels(left, found.levels)
         energy = own.T @ (own * noise.weights(left, levels)[:, None]) + precision
-        narrowed = np.linalg.slogdet(energy)[1] + 2.0 * float(np.sum(np.log(one.sigma)))
         away = amounts / one.sigma
-        gains[i] = noise.log_likelihood(left, levels) - before - 0.5 * float(away @ away) - 0.5 * narrowed
+        gained = noise.log_likelihood(left, levels) - before
+        gains[i] = gained - 0.5 * float(away @ away) - 0.5 * _narrowed(energy, one.sigma)
     return gains
 
 

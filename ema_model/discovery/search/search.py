@@ -13,6 +13,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ema_model.discovery.candidates.faults import fault_trial
 from ema_model.discovery.candidates.fingerprints import Fingerprint, fingerprints
 from ema_model.discovery.candidates.refit import Trial, held_back, weakened
 from ema_model.discovery.candidates.unknown import is_a_shape
@@ -20,25 +21,16 @@ from ema_model.discovery.criteria import FAR, LARGEST_GROUP, LEAST_FALL
 from ema_model.discovery.evidence.objections import implausible, ratio, unmeasured, unsteady, within
 from ema_model.discovery.evidence.remaining import at_floor
 from ema_model.discovery.result import Candidate
-from ema_model.discovery.search.evidence import Array, Evidence, Unknowns, evidence_at, evidence_of, gains_of
-from ema_model.discovery.search.terms import (
-    Term,
-    candidate_of,
-    idle_parts,
-    noise_of,
-    of_parts,
-    terms_of,
-    unknowns_of_fit,
-)
+from ema_model.discovery.search.evidence import evidence_at, evidence_of, gains_of
+from ema_model.discovery.search.terms import AboutFit, Term, noise_of, places_beside, places_of, terms_of
 from ema_model.discovery.steps.claim import of_other_parts, without_series
 from ema_model.discovery.steps.path import Story
-from ema_model.discovery.steps.walking import Walk, Walked, named_in, of_drive, still_alike, with_curve
+from ema_model.discovery.steps.walking import Walk, of_drive
 from ema_model.effects import CATALOGUE, catalogue_name, find
 from ema_model.estimation.calibrate import problem_of
 from ema_model.estimation.model_fit import Data, Fit, fit, floor_ratio, holdout_signals, with_effect
 from ema_model.estimation.noise import NoiseModel
-from ema_model.estimation.problem import to_vector, unknowns_of
-from ema_model.faults import NAMES, cause_of, causes
+from ema_model.faults import NAMES, causes
 from ema_model.side_by_side import fits
 
 Progress = Callable[[str], None]
@@ -56,7 +48,7 @@ _MIGHT = 0.6  # of the greatest gain by algebra, from which on a Term may be the
 
 
 @dataclass(frozen=True, eq=False)
-class Weighed:
+class ScoredTerm:
     """A Term beside a model, by algebra."""
 
     term: Term
@@ -65,52 +57,42 @@ class Weighed:
     start: Mapping[str, float]  # of a refit: where the model's own unknowns go beside it, in σ
 
 
-def log_prior(terms: Sequence[Term]) -> float:
-    """Logarithm of the odds that any one of these is missing."""
-    count = len({one.name for one in terms})
-    return math.log(_ANY_MISSING / max(1, count))
-
-
-def evidence_of_fit(data: Data, held: Data | None, found: Fit, noise: NoiseModel | None = None) -> float:
-    """Logarithm of the evidence of a refitted model: of what was fitted, and how well it foretells what was not."""
-    return probability_of_fit(data, held, found, noise)[0]
-
-
-def probability_of_fit(
-    data: Data, held: Data | None, found: Fit, noise: NoiseModel | None = None
-) -> tuple[float, float]:
+def probability_of_fit(data: Data, held: Data | None, found: Fit, noise: NoiseModel) -> tuple[float, float]:
     """Logarithms of a refitted model's evidence, and of the probability density at its most probable parameters.
 
     They are taken where the fit ended, or where the algebra would go from there if that, simulated, is more probable.
-    A further parameter of an effect, that does nothing by default, is as likely not there.
+    A further parameter of an effect, that does nothing by default, is as likely not there.  Recordings that were not
+    fitted count by how probable the model makes them.
     """
-    noise = noise or noise_of(data, found)
-    unknowns, residual = unknowns_of_fit(found, noise), noise.coefficients(found.residual)
-    calibration = found.calibration
-    problem = problem_of(found.plant, data.floors, free=calibration.free, signals=data.signals)
+    whole = AboutFit.of(found, noise)
+    problem = problem_of(found.plant, data.floors, free=found.calibration.free, signals=data.signals)
 
     def about(left_out: Sequence[int]) -> tuple[float, float]:
-        own = unknowns.without(left_out)
-        moved = np.zeros(len(unknowns.mean))
-        moved[left_out] = unknowns.mean[left_out]  # at their defaults
-        best = evidence_of(noise, residual + unknowns.columns @ moved, own)
+        own = whole.without(left_out)
+        best = evidence_of(noise, own.residual, own.unknowns)
+        moved = whole.to_mean(left_out)
         there = moved.copy()
         there[np.setdiff1d(np.arange(len(there)), left_out)] = best.amounts
-        points = problem.clip(calibration.x + np.array([moved, there]))
+        points = problem.clip(found.calibration.x + np.array([moved, there]))
         shown = problem.residuals(points)[:, : problem.values]
-        amounts = np.array([np.zeros(len(own.mean)), best.amounts])
-        return max(evidence_at(noise, noise.coefficients(one), own, a) for one, a in zip(shown, amounts))
+        amounts = np.array([np.zeros(len(best.amounts)), best.amounts])
+        return max(evidence_at(noise, noise.coefficients(one), own.unknowns, a) for one, a in zip(shown, amounts))
 
     log, density = about([])
-    idle = idle_parts(found)
-    if idle:
-        plain = about(idle)
+    beside = places_beside(found)
+    if beside:
+        plain = about(beside)
         log, density = float(np.logaddexp(log, plain[0])) - math.log(2.0), max(density, plain[1])
-    unseen = 0.0 if held is None else foretold(held, found)
+    unseen = 0.0 if held is None else log_predictive(held, found)
     return log + unseen, density + unseen
 
 
-def foretold(held: Data, found: Fit) -> float:
+def evidence_of_fit(data: Data, held: Data | None, found: Fit, noise: NoiseModel) -> float:
+    """Logarithm of a refitted model's evidence."""
+    return probability_of_fit(data, held, found, noise)[0]
+
+
+def log_predictive(held: Data, found: Fit) -> float:
     """Logarithm of the probability of recordings that were not fitted."""
     plant = held.plant(found.calibration.actuator)
     shown = held.over_floor(plant, holdout_signals(held, found))
@@ -120,54 +102,42 @@ def foretold(held: Data, found: Fit) -> float:
     return noise.log_likelihood(left, noise.levels(left))
 
 
-def weighed(story: Story, terms: Sequence[Term], noise: NoiseModel) -> list[Weighed]:
-    """The best variant of each Term beside the last model, the most probable first."""
-    found = story.current
-    unknowns = unknowns_of_fit(found, noise)
-    residual = noise.coefficients(found.residual)
-    own = evidence_of(noise, residual, unknowns)
+def scored_terms(found: Fit, terms: Sequence[Term], noise: NoiseModel) -> list[ScoredTerm]:
+    """The best variant of each Term beside a model, the most probable first."""
     if not terms:
         return []
-    rough = gains_of(noise, own, unknowns, [one.unknowns for one in terms]) + [one.log_share for one in terms]
-    best: dict[str, list[int]] = {}
+    about = AboutFit.of(found, noise)
+    own = evidence_of(noise, about.residual, about.unknowns)
+    names = [*found.calibration.parameters, *found.calibration.starts]
+
+    def roughly(term: Term, gain: float) -> ScoredTerm:
+        start = dict(zip(names, map(float, found.calibration.x)))
+        return ScoredTerm(term, gain, term.candidate(np.zeros(len(term.unknowns.mean)), found), start)
+
+    def closer(term: Term) -> ScoredTerm:
+        whole = evidence_of(noise, about.residual, about.unknowns.beside([term.unknowns]), own.levels)
+        moved, amounts = np.split(whole.amounts, [len(names)])
+        drop = float(own.residual @ own.residual - whole.residual @ whole.residual)
+        start = dict(zip(names, map(float, found.calibration.x + moved)))
+        return ScoredTerm(term, whole.log - own.log + term.log_share, term.candidate(amounts, found, drop), start)
+
+    rough = gains_of(noise, own, about.unknowns, [one.unknowns for one in terms]) + [one.log_share for one in terms]
+    variants: dict[str, list[int]] = {}
     for i in np.argsort(-rough):
-        best.setdefault(terms[i].name, []).append(int(i))
-    closer = [i for its in list(best.values())[:_CLOSER] for i in its[:2]]
-    gains: dict[int, tuple[float, Evidence | None]] = {
-        i: (float(rough[i]), None) for its in best.values() for i in its[:1]
-    }
-    for i in closer:
-        whole = evidence_of(noise, residual, unknowns.beside([terms[i].unknowns]), own.levels)
-        gains[i] = (whole.log - own.log + terms[i].log_share, whole)
-    found_: dict[str, Weighed] = {}
-    for i, (gain, whole) in gains.items():
-        term = terms[i]
-        known = found_.get(term.name)
-        if known is not None and known.gain >= gain:
-            continue
-        count = term.unknowns.columns.shape[1]
-        amounts = whole.amounts[-count:] if whole else np.zeros(count)
-        moved = found.calibration.x + (whole.amounts[:-count] if whole else 0.0)
-        start = dict(zip([*found.calibration.parameters, *found.calibration.starts], map(float, moved)))
-        drop = _drop(found, own, whole)
-        found_[term.name] = Weighed(term, gain, candidate_of(term, amounts, found, drop), start)
-    return sorted(found_.values(), key=lambda one: -one.gain)
+        variants.setdefault(terms[i].name, []).append(int(i))
+    scored = []
+    for place, its in enumerate(variants.values()):
+        looked_at = [closer(terms[i]) for i in its[:2]] if place < _CLOSER else [roughly(terms[its[0]], rough[its[0]])]
+        scored.append(max(looked_at, key=lambda one: one.gain))
+    return sorted(scored, key=lambda one: -one.gain)
 
 
-def refitted(data: Data, current: Fit, one: Weighed, tell: Progress = lambda text: None) -> Trial:
+def refitted(data: Data, current: Fit, one: ScoredTerm, tell: Progress = lambda text: None) -> Trial:
     """A Term in a model, refitted from where the algebra has it."""
     candidate = one.candidate
+    if one.term.fingerprint is None:
+        return fault_trial(data, current, candidate, tell, one.start)
     tell(f"trying {candidate.name}")
-    if one.term.kind == "fault":
-        names = cause_of(candidate.name)
-        k = current.calibration.k.copy()
-        for name in names:
-            k[NAMES.index(name)] = candidate.settings[name]
-        vector = to_vector(k)
-        guess = {u.name: float(vector[u.place] - u.nominal) / u.sigma for u in unknowns_of(current.actuator, names)}
-        faults = (*current.faults, *names)
-        best = fit(data, current.actuator, {**one.start, **guess}, tell, faults, final=False)
-        return Trial(candidate, {}, best, current.chi2 - best.chi2, names)
     key, settings, start = one.term.name, candidate.settings, one.start
     best = None
     for _ in range(_RECENTRED):
@@ -187,10 +157,6 @@ def refitted(data: Data, current: Fit, one: Weighed, tell: Progress = lambda tex
     return Trial(candidate, {key: candidate.settings}, best, current.chi2 - best.chi2)
 
 
-def _drop(found: Fit, own: Evidence, whole: Evidence | None) -> float:
-    return 0.0 if whole is None else float(own.residual @ own.residual - whole.residual @ whole.residual)
-
-
 @dataclass(frozen=True, eq=False)
 class Contender:
     """A refitted trial, and how much more probable it makes the recordings than the model that it was tried beside."""
@@ -199,10 +165,10 @@ class Contender:
     gain: float  # logarithm, with what is known of it beforehand
     density: float  # the same at its most probable parameters alone
 
-    def is_told_from(self, other: Contender) -> bool:
-        """Whether the recordings tell another one that is less probable from this one.
+    def is_told_apart_from(self, other: Contender) -> bool:
+        """Whether the recordings tell this one from another that is less probable.
 
-        One that fits as well, and is less probable for its freedom alone, they do not tell.
+        Not from one that fits as well, and is less probable for its freedom alone.
         """
         return other.gain < self.gain - _NAMED and other.density < self.density - _AS_WELL
 
@@ -215,8 +181,12 @@ class Round:
     noise: NoiseModel
     before: float  # logarithm of that model's evidence
     ranked: Sequence[Candidate]  # all candidates, those too that no Term stands for
-    best: Sequence[Weighed]  # by algebra, the most probable first
-    contenders: Sequence[Contender]  # those that were refitted, likewise
+    best: Sequence[ScoredTerm]  # by algebra, the most probable first
+
+    @property
+    def prior(self) -> float:
+        """Logarithm of the odds that any one of the Terms is missing."""
+        return math.log(_ANY_MISSING / max(1, len(self.best)))
 
 
 class Search(Walk):
@@ -225,24 +195,19 @@ class Search(Walk):
     def __init__(self, story: Story, tell: Progress, candidates: Sequence[str] | None, most_effects: int) -> None:
         super().__init__(story, tell, candidates, most_effects)
         self._known: Round | None = None
+        self._refitted: tuple[Round, list[Contender]] | None = None
         self._exchanges: set[tuple[str, str]] = set()  # that were tried
 
-    def ended(self) -> Walked:
-        """Goes on to the end: adds, exchanges and takes out what makes the model more probable."""
-        story, tell = self.story, self._tell
+    def _go_to_the_end(self) -> None:
+        """Adds, exchanges and takes out what makes the model more probable."""
         while self._going:
             self.go()
         while self._exchanged() or self._doubtful():
             pass
-        unknown = story.left().explanation
-        if unknown is not None and not named_in(story):
-            unknown = with_curve(story, self._curve, unknown, tell)
-        story.settle(tell)
-        return Walked(self._first, still_alike(story, self._rivals), unknown)
 
     def drive_leaves(self) -> float:
         """What the best contenders of the drive leave, in floors."""
-        trials = [one.trial for one in self._round().contenders if of_drive(one.trial.candidate)]
+        trials = [one.trial for one in self._contenders() if of_drive(one.trial.candidate)]
         return min((ratio(self.story.data, trial.fit) for trial in trials), default=math.inf)
 
     def _best(self) -> Candidate | None:
@@ -254,43 +219,44 @@ class Search(Walk):
         return best[0].candidate if best else None
 
     def _round(self) -> Round:
-        """All Terms beside the last model, and the few that were refitted."""
-        story, tell = self.story, self._tell
-        found = story.current
-        if self._known is not None and self._known.beside is found:
-            return self._known
-        noise = noise_of(story.data, found)
-        tell("scoring the candidates")
-        ranked = story.ranked(self._names)
-        prints = [*story.prints, *_further_orders(story)]
-        best = weighed(story, terms_of(story.data, found, prints, noise), noise)
-        before = evidence_of_fit(story.data, story.held, found, noise)
-        chosen = [one for one in best if one.gain > max(_LEAST_SCORE, _MIGHT * best[0].gain)][:_REFITTED]
-        trials = fits(lambda one, tell: refitted(story.data, found, one, tell), chosen, tell)
-        contenders = []
-        for one, trial in zip(chosen, trials):
-            log, density = probability_of_fit(story.data, story.held, trial.fit, noise)
-            contenders.append(Contender(trial, log - before + one.term.log_share, density))
-        contenders.sort(key=lambda one: -one.gain)
-        self._known = Round(found, noise, before, ranked, best, contenders)
+        """All Terms beside the last model."""
+        story, found = self.story, self.story.current
+        if self._known is None or self._known.beside is not found:
+            noise = noise_of(story.data, found)
+            self._tell("scoring the candidates")
+            ranked = story.ranked(self._names)
+            prints = [*story.prints, *_further_orders(story)]
+            best = scored_terms(found, terms_of(story.data, found, prints, noise), noise)
+            before = evidence_of_fit(story.data, story.held, found, noise)
+            self._known = Round(found, noise, before, ranked, best)
         return self._known
 
+    def _contenders(self) -> list[Contender]:
+        """The few Terms that might be the best beside the last model, refitted, the most probable first."""
+        story, seen = self.story, self._round()
+        if self._refitted is None or self._refitted[0] is not seen:
+            chosen = [one for one in seen.best if one.gain > max(_LEAST_SCORE, _MIGHT * seen.best[0].gain)][:_REFITTED]
+            trials = fits(lambda one, tell: refitted(story.data, seen.beside, one, tell), chosen, self._tell)
+            found = []
+            for one, trial in zip(chosen, trials):
+                log, density = probability_of_fit(story.data, story.held, trial.fit, seen.noise)
+                found.append(Contender(trial, log - seen.before + one.term.log_share, density))
+            self._refitted = seen, sorted(found, key=lambda one: -one.gain)
+        return self._refitted[1]
+
     def _step(self) -> bool:
-        story = self.story
-        now = self._round()
-        contenders = now.contenders
-        prior = log_prior([one.term for one in now.best])
-        self._first = self._first or _told(now, prior)
-        named = [one for one in contenders if one.gain + prior > _NAMED and not self._objection(one)]
+        story, seen, contenders = self.story, self._round(), self._contenders()
+        self._first = self._first or _candidates(seen, contenders)
+        named = [one for one in contenders if one.gain + seen.prior > _NAMED and not self._objection(one)]
         if not named:
             return False
         first = _simplest(named)
-        curve = self._curve_instead(first, now)
+        curve = self._curve_instead(first, seen)
         if curve is not None:
             self._curve = curve
             return False
         name = first.trial.candidate.name
-        alike = [one.trial for one in named if one is not first and not first.is_told_from(one)]
+        alike = [one.trial for one in named if one is not first and not first.is_told_apart_from(one)]
         alike = [trial for trial in alike if trial.faults or name not in find(trial.candidate.name).terms]
         faults = [trial for trial in alike if trial.faults]
         effects = without_series([trial for trial in alike if not trial.faults])
@@ -304,7 +270,8 @@ class Search(Walk):
         names = {trial.candidate.name for trial in (first.trial, *others)}
         story.add(first.trial, ties=[trial.candidate.name for trial in others])
         if not first.trial.faults:
-            story.told_probable(sum(p for name, p in _probabilities(now, prior).items() if name in names))
+            probable = _probabilities(seen, contenders)
+            story.set_probability(min(1.0, sum(probable[name] for name in names)))
         return True
 
     def _objection(self, one: Contender) -> bool:
@@ -350,10 +317,12 @@ class Search(Walk):
         story = self.story
         orders = [values["order"] for values in first.trial.fit.actuator.effects.values() if "order" in values]
         if is_a_shape(orders):
-            added = story.steps[story.bare :]
+            added, curve = story.steps[story.bare :], None
             story.restart()
-            curve = story.curve(story.left().explanation, self._tell)
-            story.steps += [] if curve else added
+            try:
+                curve = story.curve(story.left().explanation, self._tell)
+            finally:  # also when it was stopped
+                story.steps += [] if curve else added
             return curve
         if at_floor(story.data, first.trial.fit):
             return None
@@ -371,41 +340,35 @@ class Search(Walk):
             return False
         seen = self._round()
         for key in members:
-            if self._reduced(key, seen)[2].log < seen.before - 2.0 * _NAMED:
+            smaller = AboutFit.of(seen.beside, seen.noise).without(places_of(seen.beside, key))
+            if evidence_of(seen.noise, smaller.residual, smaller.unknowns).log < seen.before - 2.0 * _NAMED:
                 continue
             tell(f"trying without {key}")
-            smaller = story.without(key, tell)
-            if evidence_of_fit(story.data, story.held, smaller, seen.noise) > seen.before - _NAMED:
-                story.remove(key, smaller)
+            found = story.without(key, tell)
+            if evidence_of_fit(story.data, story.held, found, seen.noise) > seen.before - _NAMED:
+                story.remove(key, found)
                 return True
         return any(self._replaced(key, seen) for key in members[:-1])
-
-    def _reduced(self, key: str, seen: Round) -> tuple[Array, Unknowns, Evidence]:
-        """The last model without one of its effects or faults, by algebra: residual, unknowns and evidence."""
-        found, noise = self.story.current, seen.noise
-        unknowns, residual = unknowns_of_fit(found, noise), noise.coefficients(found.residual)
-        parts = of_parts(found, key)
-        steps = np.zeros(len(unknowns.mean))
-        steps[parts] = unknowns.mean[parts]
-        residual, unknowns = residual + unknowns.columns @ steps, unknowns.without(parts)
-        return residual, unknowns, evidence_of(noise, residual, unknowns)
 
     def _replaced(self, key: str, seen: Round) -> bool:
         """Puts the best other Term in the place of an effect or a fault where that makes the model more probable."""
         story, tell = self.story, self._tell
-        residual, unknowns, own = self._reduced(key, seen)
+        if not seen.best:
+            return False
+        about = AboutFit.of(seen.beside, seen.noise).without(places_of(seen.beside, key))
+        own = evidence_of(seen.noise, about.residual, about.unknowns)
         terms = [one.term for one in seen.best]
-        rough = gains_of(seen.noise, own, unknowns, [one.unknowns for one in terms]) + [one.log_share for one in terms]
-        term = terms[int(np.argmax(rough))]
-        whole = evidence_of(seen.noise, residual, unknowns.beside([term.unknowns]), own.levels)
+        rough = gains_of(seen.noise, own, about.unknowns, [one.unknowns for one in terms])
+        term = terms[int(np.argmax(rough + [one.log_share for one in terms]))]
+        whole = evidence_of(seen.noise, about.residual, about.unknowns.beside([term.unknowns]), own.levels)
         if whole.log + term.log_share < seen.before - _NAMED or (key, term.name) in self._exchanges:
             return False
         self._exchanges.add((key, term.name))
         self._exchanges.add((term.name, key))
         tell(f"weighing {term.name} against {key} again")
         smaller = story.without(key, tell)
-        candidate = candidate_of(term, whole.amounts[-len(term.unknowns.mean) :], story.current, 0.0)
-        trial = refitted(story.data, smaller, Weighed(term, 0.0, candidate, smaller.starts), tell)
+        candidate = term.candidate(whole.amounts[-len(term.unknowns.mean) :], story.current)
+        trial = refitted(story.data, smaller, ScoredTerm(term, 0.0, candidate, smaller.starts), tell)
         gain = evidence_of_fit(story.data, story.held, trial.fit, seen.noise) + term.log_share - seen.before
         if gain < 0.0:
             if key not in NAMES:
@@ -423,7 +386,7 @@ def _simplest(named: Sequence[Contender]) -> Contender:
     """The most probable, or a term of its series that is not far less: the motion shows no more than that."""
     first = named[0]
     terms = () if first.trial.faults else find(first.trial.candidate.name).terms
-    near = [one for one in named if one.trial.candidate.name in terms and not first.is_told_from(one)]
+    near = [one for one in named if one.trial.candidate.name in terms and not first.is_told_apart_from(one)]
     return near[0] if near else first
 
 
@@ -440,21 +403,22 @@ def _further_orders(story: Story) -> list[Fingerprint]:
     return prints
 
 
-def _probabilities(seen: Round, prior: float) -> dict[str, float]:
+def _probabilities(seen: Round, contenders: Sequence[Contender]) -> dict[str, float]:
     """How probable each candidate is, of all and none: of what was refitted by that, of the others by algebra."""
-    gains = {one.candidate.name: one.gain for one in seen.best} | {
-        one.trial.candidate.name: one.gain for one in seen.contenders
-    }
-    odds = {name: gain + prior for name, gain in gains.items()}
+    gains = {one.candidate.name: one.gain for one in seen.best}
+    gains |= {one.trial.candidate.name: one.gain for one in contenders}
+    odds = {name: gain + seen.prior for name, gain in gains.items()}
     whole = float(np.logaddexp.reduce([0.0, *odds.values()]))
     return {name: math.exp(one - whole) for name, one in odds.items()}
 
 
-def _told(seen: Round, prior: float) -> list[Candidate]:
-    """All candidates with what their refits gave, and how probable each is."""
-    drops = {one.trial.candidate.name: one.trial.drop for one in seen.contenders}
-    probable = _probabilities(seen, prior)
-    known = {one.candidate.name: one.candidate for one in seen.best}
-    every = [*known.values(), *(one for one in seen.ranked if one.name not in known)]
-    told = [replace(one, refitted_drop=drops.get(one.name), probability=probable.get(one.name, 0.0)) for one in every]
-    return sorted(told, key=lambda one: -(one.probability or 0.0))
+def _candidates(seen: Round, contenders: Sequence[Contender]) -> list[Candidate]:
+    """All candidates, the most probable first, with what their refits gave; what cannot be shown says so."""
+    drops = {one.trial.candidate.name: one.trial.drop for one in contenders}
+    probable = _probabilities(seen, contenders)
+    found = {one.candidate.name: one.candidate for one in seen.best}
+    found |= {one.name: one for one in seen.ranked if one.name not in found or (one.obstacle and one.name not in drops)}
+    every = [
+        replace(one, refitted_drop=drops.get(name), probability=probable.get(name, 0.0)) for name, one in found.items()
+    ]
+    return sorted(every, key=lambda one: -(one.probability or 0.0))

@@ -234,8 +234,8 @@ class Story:
         ]
         self.steps[-1] = replace(last, added=tuple(added))
 
-    def told_probable(self, probability: float) -> None:
-        """How probable it is that what was added last, or what cannot be told from it, is missing."""
+    def set_probability(self, probability: float) -> None:
+        """Says how probable it is that what was added last, or what cannot be told from it, is missing."""
         last = self.steps[-1]
         if last.added:
             added = (*last.added[:-1], replace(last.added[-1], probability=probability))

@@ -131,7 +131,17 @@ class Walk:
         self._going = len({one.name for one in self.story.added}) < self._most and self._step()
 
     def ended(self) -> Walked:
-        """Goes on to the end; takes out what became idle or doubtful, draws what is unknown, and settles."""
+        """Goes on to the end, draws what is unknown, and settles."""
+        story, tell = self.story, self._tell
+        self._go_to_the_end()
+        unknown = story.left().explanation
+        if unknown is not None and not named_in(story):
+            unknown = _with_curve(story, self._curve, unknown, tell)
+        story.settle(tell)  # last: beside a settled model any refit falls that only goes back to the sensors' noise
+        return Walked(self._first, _still_alike(story, self._rivals), unknown)
+
+    def _go_to_the_end(self) -> None:
+        """Adds what pays; takes out what became idle or doubtful."""
         # Each round looks whether or not anything is seen to be left: a fingerprint knows better what to look for.
         story, tell = self.story, self._tell
         while self._going:
@@ -142,11 +152,6 @@ class Walk:
         weigh_again(story, self._near, tell)
         drop_idle(story, tell)
         drop_doubtful(story, tell)
-        unknown = story.left().explanation
-        if unknown is not None and not named_in(story):
-            unknown = with_curve(story, self._curve, unknown, tell)
-        story.settle(tell)  # last: beside a settled model any refit falls that only goes back to the sensors' noise
-        return Walked(self._first, still_alike(story, self._rivals), unknown)
 
     def _begin_with(self, fault: Trial) -> None:
         """Walks anew beside a fault in whose place an effect stood."""
@@ -277,7 +282,7 @@ def _leading(trials: Sequence[Trial], accepted: Sequence[Trial]) -> int:
     return trials.index(accepted[0]) if accepted else len(trials) - 1
 
 
-def with_curve(story: Story, curve: Trial | None, unknown: Explanation, tell: Progress) -> Explanation:
+def _with_curve(story: Story, curve: Trial | None, unknown: Explanation, tell: Progress) -> Explanation:
     """Adds the curve of what is unknown, and tells what it stands for.
 
     Parameters that only bent toward it go back: the curve is drawn beside the calibrated model, if one can be.
@@ -300,7 +305,7 @@ def with_curve(story: Story, curve: Trial | None, unknown: Explanation, tell: Pr
     return unknown
 
 
-def still_alike(story: Story, rivals: Sequence[Trial]) -> list[Trial]:
+def _still_alike(story: Story, rivals: Sequence[Trial]) -> list[Trial]:
     """An effect and its rivals, where the last model still has it and cannot tell it from them."""
     known = {one.name: one.same_as for one in story.added}
     names = known.get(rivals[0].candidate.name, ()) if rivals else ()

@@ -13,7 +13,7 @@ import viser
 
 from ema_model.actuator import Actuator
 from ema_model.comparison.regions import Region, worst_moment
-from ema_model.comparison.result import Compared, Comparison, details, errors, errors_by_recording, of_floor
+from ema_model.comparison.result import FLOOR_NOTE, Compared, Comparison, details, errors, errors_by_recording, of_floor
 from ema_model.errors import InputError
 from ema_model.estimation.calibrate import calibration_table, together
 from ema_model.estimation.floor import BAND_SIGMAS
@@ -449,8 +449,9 @@ def headline(comparison: Comparison) -> Html:
 def numbers(comparison: Comparison) -> Html:
     """For each signal, error against floor."""
     return html(
-        "<div {}>{}{}</div>",
+        "<div {}>{}{}{}</div>",
         _BOX,
         shown(errors(comparison)),
+        html('<div style="opacity:.8;font-size:12.5px">{}</div>', FLOOR_NOTE),
         folded("Each measurement", errors_by_recording(comparison, comparison.primary)),
     )

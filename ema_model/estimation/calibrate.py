@@ -322,6 +322,7 @@ class Calibration:
     confounded: tuple[tuple[str, str], ...]  # pairs that trade against each other
     identifiable: tuple[Combination, ...]  # what is known only together, of parameters that are hardly known alone
     free: tuple[str, ...]
+    is_final: bool = True  # it went to its end, and its intervals are the recordings'
 
     def start_of(self, window: int | None) -> tuple[float, float, float]:
         """How a fitted window began beyond what was measured; 0 if unknown.
@@ -362,6 +363,7 @@ def calibrate(
     start: Mapping[str, float] | None = None,
     on_progress: Callable[[int], None] | None = None,
     final: bool = True,
+    rough: bool = False,
 ) -> Calibration:
     """Fits the free parameters ("section.name", "effects.name.parameter", or k1…k8), and each window's start.
 
@@ -372,10 +374,11 @@ def calibrate(
     start: x by name, from an earlier fit, from which alone this one begins.
     on_progress is told the evaluations so far, and may raise to stop.
     final: whether its intervals are told; else directions that are hardly known are not simulated for them.
+    rough: the start is near the end, and half a unit of χ² less would change nothing.
     Raises InputError for a parameter that does not exist or has no tolerance.
     """
     problem = problem_of(model, floors, free=free, k=k, signals=signals)
-    search = _Search(problem, on_progress)
+    search = _Search(problem, on_progress, rough)
     fit = search.solve(start)
     x = fit.x
     chi2 = fit.chi2
@@ -408,6 +411,7 @@ def calibrate(
         confounded=_confounded(problem.unknowns, covariance),
         identifiable=_products(problem, x, covariance, jacobian[: problem.values], fit.residual) if final else (),
         free=chosen,
+        is_final=final and not rough,
     )
 
 
@@ -438,8 +442,8 @@ class _Found:
 class _Search:
     """Least squares from several starts, until the two best agree."""
 
-    def __init__(self, problem: Problem, on_progress: Callable[[int], None] | None) -> None:
-        self.problem = problem
+    def __init__(self, problem: Problem, on_progress: Callable[[int], None] | None, rough: bool) -> None:
+        self.problem, self.rough = problem, rough
         self.on_progress = on_progress
         self.evaluations = 0
 
@@ -484,7 +488,7 @@ class _Search:
     def _from(self, starts: Sequence[Array], soft: float | None = None) -> _Found:
         fits, agree = [], len(starts) == 1
         for start in starts:
-            fits.append(descended(self.problem, start, soft, self._tell))
+            fits.append(descended(self.problem, start, soft, self._tell, near=self.rough))
             fits.sort(key=lambda fit: fit.cost)
             # "At most a hundredth apart": two minima of the same depth are one answer, and none is deeper than nothing.
             if fits[0].cost < 2.0 or (len(fits) > 1 and fits[1].cost < 1.01 * fits[0].cost + 2.0):

@@ -36,14 +36,22 @@ class Descended:
 
 
 def descended(
-    problem: Problem, start: Array, soft: float | None = None, tell: Callable[[], None] = lambda: None
+    problem: Problem,
+    start: Array,
+    soft: float | None = None,
+    tell: Callable[[], None] = lambda: None,
+    *,
+    near: bool = False,
 ) -> Descended:
     """Down from a start (unknowns,), inside the problem's bounds.
 
     soft: beyond so many σ, errors count as themselves instead of as their squares.
     tell is called before each evaluation and may raise to stop.
+    near: the start is near the end: Marquardt's steps alone, up to the first that changes nothing that counts.
     """
     taken = problem if soft is None else _Soft(problem, soft)
+    if near:
+        return _by_marquardt(taken, start, None, tell, most_idle=1)
     return _by_marquardt(taken, *_by_trust_region(taken, start, tell), tell)
 
 
@@ -72,11 +80,15 @@ def _by_trust_region(
 
 
 def _by_marquardt(
-    problem: BoundedProblem, start: Array, known: tuple[Array, Array], tell: Callable[[], None]
+    problem: BoundedProblem,
+    start: Array,
+    known: tuple[Array, Array] | None,
+    tell: Callable[[], None],
+    most_idle: int = _MOST_IDLE,
 ) -> Descended:
     descent = Descent.begin(problem, start, known)
     before, idle, steps = np.inf, 0, 0
-    while not descent.done and idle < _MOST_IDLE and steps < _LONGEST:
+    while not descent.done and idle < most_idle and steps < _LONGEST:
         tell()
         descent.step()
         now = 0.5 * float(descent.cost[0])

@@ -199,11 +199,11 @@ def fit(
     tell: Callable[[str], None] | None = None,
     faults: tuple[str, ...] = (),
     held: tuple[str, ...] = (),
-    final: bool = True,
+    rough: bool = False,
 ) -> Fit:
     """Calibrates the base parameters but those held, those of the actuator's effects, and these faults together.
 
-    final: as `calibrate` has it.
+    rough: as `calibrate` has it, and without intervals.
     """
     plant = data.plant(actuator)
     calibration = calibrate(
@@ -213,7 +213,8 @@ def fit(
         signals=data.signals,
         start=start,
         on_progress=None if tell is None else lambda evaluations: tell(f"fitting (simulations: {evaluations})"),
-        final=final,
+        final=not rough,
+        rough=rough,
     )
     names = [*calibration.parameters, *calibration.starts]
     starts = {name: float(x) for name, x in zip(names, calibration.x)}

@@ -185,7 +185,7 @@ def _refitted(
     if start is None:
         best = _better_start(data, current, guess, tell, faults)
     else:
-        best = fit(data, current.actuator, {**start, **guess}, tell, faults, final=False)
+        best = fit(data, current.actuator, {**start, **guess}, tell, faults, rough=True)
     return Trial(candidate, {}, best, current.chi2 - best.chi2, names)
 
 

@@ -36,6 +36,15 @@ def scored(found: Fit, prints: Sequence[Fingerprint]) -> list[Candidate]:
     return sorted(best.values(), key=lambda candidate: -candidate.predicted_drop)
 
 
+def hidden(found: Fit, prints: Sequence[Fingerprint]) -> dict[str, str]:
+    """Effects that these recordings cannot show at any of their fingerprints, each with the reason."""
+    its = [one for one in prints if not one.frees]
+    reasons: dict[str, list[str]] = {}
+    for one, beyond in zip(its, _beyond_all(*movable(found), [one.columns for one in its])):
+        reasons.setdefault(one.name, []).append(unseen(one.columns.T @ beyond, _strong_steps(found, one)))
+    return {name: said[0] for name, said in reasons.items() if all(said)}
+
+
 def scored_all(found: Fit, prints: Sequence[Fingerprint]) -> list[Candidate]:
     """A candidate for each fingerprint, in their order."""
     usual = movable(found)
@@ -155,7 +164,7 @@ def _scored(
     if one.frees:
         return Candidate(one.name, max(0.0, float(toward @ amounts)), settings_at(found, one, amounts))
     first = effect.parameters[0]
-    reason = unseen(energy, strong_case(found, effect) / one.settings[first.name])
+    reason = unseen(energy, _strong_steps(found, one))
     given = 0.0
     if freed:
         amounts, energy, toward, given = freed[:4]
@@ -194,6 +203,12 @@ def settings_at(found: Fit, one: Fingerprint, amounts: Array) -> dict[str, float
         settings[first.name] = first.nearest(settings[first.name] * math.hypot(*amounts))
         settings[effect.phase] = math.atan2(float(amounts[1]), float(amounts[0]))
     return settings
+
+
+def _strong_steps(found: Fit, one: Fingerprint) -> float:
+    """How many times a fingerprint's own strength a strong case of its effect is."""
+    effect = find(one.name, found.actuator.axes)
+    return strong_case(found, effect) / one.settings[effect.parameters[0].name]
 
 
 def strong_case(found: Fit, effect: Effect) -> float:

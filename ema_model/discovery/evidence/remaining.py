@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cached_property, lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,13 +30,34 @@ from ema_model.estimation.model_fit import Data, Fit, floor_ratio, twins_of
 Array = NDArray[np.float64]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Left:
-    """Of the residual that `comparison` would explain: the current's, where it is measured."""
+    """Of the residual that `comparison` would explain, the current's where it is measured: each part when asked for."""
 
-    explained: list[Explanation]  # all that was tried
-    orders: list[float]  # that the recordings can show, the strongest first
-    events: list[Event]  # what happened at one moment of a recording
+    data: Data
+    found: Fit
+
+    @cached_property
+    def explained(self) -> list[Explanation]:
+        """All that was tried, the most significant first."""
+        residuals = residuals_left(self.data, self.found)
+        return explain(residuals, _primary(residuals), self.found.actuator.axes)
+
+    @cached_property
+    def orders(self) -> list[float]:
+        """Those that the recordings can show, the strongest first."""
+        residuals = residuals_left(self.data, self.found)
+        return [one.order for one in _orders(residuals, _primary(residuals), self.found.actuator)]
+
+    @cached_property
+    def events(self) -> list[Event]:
+        """What happened at one moment of a recording."""
+        if at_floor(self.data, self.found):
+            return []
+        residuals = residuals_left(self.data, self.found)
+        fitted = [name for name in self.data.signals if name in residuals.values]
+        names = [one.name for one in self.data.measurements]
+        return events(residuals, fitted, names, self.found.calibration.actuator)
 
     @property
     def explanation(self) -> Explanation | None:
@@ -77,19 +98,13 @@ def lasts(data: Data, found: Fit) -> bool:
 @lru_cache(maxsize=4)  # a walk asks before and after it has looked for the next effect
 def left_by(data: Data, found: Fit) -> Left:
     """What a fit leaves."""
-    residuals = residuals_left(data, found)
-    primary = next(name for name in ORDER_OF_PRIMARY if name in residuals.values)
-    orders = _orders(residuals, primary, found.actuator)
-    fitted = [name for name in data.signals if name in residuals.values]
-    names = [one.name for one in data.measurements]
-    happened = [] if at_floor(data, found) else events(residuals, fitted, names, found.calibration.actuator)
-    return Left(explain(residuals, primary, found.actuator.axes), [one.order for one in orders], happened)
+    return Left(data, found)
 
 
 def used_left(data: Data, before: Fit, after: Fit) -> tuple[str, Array, Array]:
     """The signal that is explained, and what two fits leave of it where it counts, over its floor: (blocks,) each."""
     first, second = residuals_left(data, before), residuals_left(data, after)
-    primary = next(name for name in ORDER_OF_PRIMARY if name in first.values)
+    primary = _primary(first)
     used = used_blocks(first, primary)
     if used is None:
         return primary, np.zeros(0), np.zeros(0)
@@ -104,6 +119,10 @@ def residuals_left(data: Data, found: Fit) -> Residuals:
     """The residuals of a fit beside the variables that may explain them."""
     fitted = found.calibration
     return residuals_of(found.plant, data.floors, fitted.signals, twins_of(found), fitted.actuator, fitted)
+
+
+def _primary(residuals: Residuals) -> str:
+    return next(name for name in ORDER_OF_PRIMARY if name in residuals.values)
 
 
 def _orders(residuals: Residuals, primary: str, actuator: Actuator) -> list[Order]:

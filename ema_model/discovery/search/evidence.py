@@ -110,7 +110,7 @@ def gains_of(noise: NoiseModel, found: Evidence, unknowns: Unknowns, others: Seq
     weighted = columns * weights[:, None]
     normal = weighted.T @ columns + np.diag(unknowns.sigma[free] ** -2.0)
     together = np.hstack([one.columns for one in others])
-    beyond = together - columns @ np.linalg.solve(normal, weighted.T @ together)
+    beyond = np.asfortranarray(together - columns @ np.linalg.solve(normal, weighted.T @ together))
     gains, first = np.zeros(len(others)), 0
     for i, one in enumerate(others):
         own = beyond[:, first : first + len(one.mean)]

@@ -16,6 +16,7 @@ import numpy as np
 from ema_model.discovery.candidates.faults import fault_trial
 from ema_model.discovery.candidates.fingerprints import Fingerprint, fingerprints
 from ema_model.discovery.candidates.refit import Trial, held_back, weakened
+from ema_model.discovery.candidates.score import hidden
 from ema_model.discovery.candidates.unknown import is_a_shape
 from ema_model.discovery.criteria import FAR, LARGEST_GROUP, LEAST_FALL
 from ema_model.discovery.evidence.objections import implausible, ratio, unmeasured, unsteady, within
@@ -42,7 +43,6 @@ _REFITTED = 4
 _LEAST_SCORE = 2.0  # logarithm of the evidence, by algebra, from which on a refit may make it enough
 _NAMED = math.log(99.0)  # odds of 99 to 1
 _AS_WELL = math.log(10.0)  # odds of 10 to 1, by their best fits alone
-_HALF = 0.5
 _APART = 0.5  # orders, closer than which two are one
 _MIGHT = 0.6  # of the greatest gain by algebra, from which on a Term may be the best once it is refitted
 
@@ -142,7 +142,7 @@ def refitted(data: Data, current: Fit, one: ScoredTerm, tell: Progress = lambda 
     best = None
     for _ in range(_RECENTRED):
         actuator = with_effect(current.actuator, key, settings)
-        found = fit(data, actuator, start, tell, current.faults, final=False)
+        found = fit(data, actuator, start, tell, current.faults, rough=True)
         if best is not None and found.chi2 > best.chi2:
             break
         best = found
@@ -180,7 +180,7 @@ class Round:
     beside: Fit
     noise: NoiseModel
     before: float  # logarithm of that model's evidence
-    ranked: Sequence[Candidate]  # all candidates, those too that no Term stands for
+    hidden: Sequence[Candidate]  # what the model has no place for, or these recordings cannot show
     best: Sequence[ScoredTerm]  # by algebra, the most probable first
 
     @property
@@ -200,10 +200,13 @@ class Search(Walk):
 
     def _go_to_the_end(self) -> None:
         """Adds, exchanges and takes out what makes the model more probable."""
+        story, tell = self.story, self._tell
         while self._going:
             self.go()
         while self._exchanged() or self._doubtful():
             pass
+        self._curve_instead()
+        story.finish(tell)
 
     def drive_leaves(self) -> float:
         """What the best contenders of the drive leave, in floors."""
@@ -224,11 +227,12 @@ class Search(Walk):
         if self._known is None or self._known.beside is not found:
             noise = noise_of(story.data, found)
             self._tell("scoring the candidates")
-            ranked = story.ranked(self._names)
+            barred = story.looked_for(self._names)
+            unseen = [Candidate(name, 0.0, {}, reason) for name, reason in hidden(found, story.prints).items()]
             prints = [*story.prints, *_further_orders(story)]
             best = scored_terms(found, terms_of(story.data, found, prints, noise), noise)
             before = evidence_of_fit(story.data, story.held, found, noise)
-            self._known = Round(found, noise, before, ranked, best)
+            self._known = Round(found, noise, before, [*unseen, *barred], best)
         return self._known
 
     def _contenders(self) -> list[Contender]:
@@ -251,10 +255,6 @@ class Search(Walk):
         if not named:
             return False
         first = _simplest(named)
-        curve = self._curve_instead(first, seen)
-        if curve is not None:
-            self._curve = curve
-            return False
         name = first.trial.candidate.name
         alike = [one.trial for one in named if one is not first and not first.is_told_apart_from(one)]
         alike = [trial for trial in alike if trial.faults or name not in find(trial.candidate.name).terms]
@@ -309,28 +309,28 @@ class Search(Walk):
                 return True
         return False
 
-    def _curve_instead(self, first: Contender, seen: Round) -> Trial | None:
-        """The residual's own curve, where it tells twice as much as the best contender, which leaves far more.
+    def _curve_instead(self) -> None:
+        """Takes the residual's own curve in place of all effects, where it is more probable than they are together.
 
         Or where several low orders are one shape within the turn, and no teeth.
         """
-        story = self.story
-        orders = [values["order"] for values in first.trial.fit.actuator.effects.values() if "order" in values]
-        if is_a_shape(orders):
-            added, curve = story.steps[story.bare :], None
-            story.restart()
-            try:
-                curve = story.curve(story.left().explanation, self._tell)
-            finally:  # also when it was stopped
-                story.steps += [] if curve else added
-            return curve
-        if at_floor(story.data, first.trial.fit):
-            return None
-        curve = story.curve(story.left().explanation, self._tell)
+        story, seen = self.story, self._round()
+        effects = story.current.calibration.actuator.effects
+        orders = [effects[one.key]["order"] for one in story.added if "order" in effects[one.key]]
+        if not story.added or (at_floor(story.data, story.current) and not is_a_shape(orders)):
+            return
+        added = story.steps[story.bare :]
+        story.restart()
+        try:
+            curve = story.curve(story.left().explanation, self._tell)
+        finally:  # also when it was stopped
+            story.steps += added
         if curve is None:
-            return None
-        gain = evidence_of_fit(story.data, story.held, curve.fit, seen.noise) - seen.before
-        return curve if first.gain < _HALF * gain else None
+            return
+        log = evidence_of_fit(story.data, story.held, curve.fit, seen.noise)
+        if is_a_shape(orders) or log > seen.before + (len(story.added) - 1) * seen.prior:
+            story.restart()
+            self._curve = curve
 
     def _exchanged(self) -> bool:
         """Takes out what the last model does not need, or puts in its place what makes it more probable."""
@@ -339,35 +339,40 @@ class Search(Walk):
         if len(members) < 2:
             return False
         seen = self._round()
+        whole = AboutFit.of(seen.beside, seen.noise)
+        straight = evidence_of(seen.noise, whole.residual, whole.unknowns).log
         for key in members:
-            smaller = AboutFit.of(seen.beside, seen.noise).without(places_of(seen.beside, key))
-            if evidence_of(seen.noise, smaller.residual, smaller.unknowns).log < seen.before - 2.0 * _NAMED:
+            smaller = whole.without(places_of(seen.beside, key))
+            if evidence_of(seen.noise, smaller.residual, smaller.unknowns).log < straight - 2.0 * _NAMED:
                 continue
             tell(f"trying without {key}")
             found = story.without(key, tell)
             if evidence_of_fit(story.data, story.held, found, seen.noise) > seen.before - _NAMED:
                 story.remove(key, found)
                 return True
-        return any(self._replaced(key, seen) for key in members[:-1])
+        return any(self._replaced(key, seen, whole, straight) for key in members[:-1])
 
-    def _replaced(self, key: str, seen: Round) -> bool:
-        """Puts the best other Term in the place of an effect or a fault where that makes the model more probable."""
+    def _replaced(self, key: str, seen: Round, whole: AboutFit, straight: float) -> bool:
+        """Puts the best other Term in the place of an effect or a fault where that makes the model more probable.
+
+        straight: the logarithm of the whole model's evidence, by algebra.
+        """
         story, tell = self.story, self._tell
         if not seen.best:
             return False
-        about = AboutFit.of(seen.beside, seen.noise).without(places_of(seen.beside, key))
+        about = whole.without(places_of(seen.beside, key))
         own = evidence_of(seen.noise, about.residual, about.unknowns)
         terms = [one.term for one in seen.best]
         rough = gains_of(seen.noise, own, about.unknowns, [one.unknowns for one in terms])
         term = terms[int(np.argmax(rough + [one.log_share for one in terms]))]
-        whole = evidence_of(seen.noise, about.residual, about.unknowns.beside([term.unknowns]), own.levels)
-        if whole.log + term.log_share < seen.before - _NAMED or (key, term.name) in self._exchanges:
+        other = evidence_of(seen.noise, about.residual, about.unknowns.beside([term.unknowns]), own.levels)
+        if other.log + term.log_share < straight - _NAMED or (key, term.name) in self._exchanges:
             return False
         self._exchanges.add((key, term.name))
         self._exchanges.add((term.name, key))
         tell(f"weighing {term.name} against {key} again")
         smaller = story.without(key, tell)
-        candidate = term.candidate(whole.amounts[-len(term.unknowns.mean) :], story.current)
+        candidate = term.candidate(other.amounts[-len(term.unknowns.mean) :], story.current)
         trial = refitted(story.data, smaller, ScoredTerm(term, 0.0, candidate, smaller.starts), tell)
         gain = evidence_of_fit(story.data, story.held, trial.fit, seen.noise) + term.log_share - seen.before
         if gain < 0.0:
@@ -417,7 +422,7 @@ def _candidates(seen: Round, contenders: Sequence[Contender]) -> list[Candidate]
     drops = {one.trial.candidate.name: one.trial.drop for one in contenders}
     probable = _probabilities(seen, contenders)
     found = {one.candidate.name: one.candidate for one in seen.best}
-    found |= {one.name: one for one in seen.ranked if one.name not in found or (one.obstacle and one.name not in drops)}
+    found |= {one.name: one for one in seen.hidden if one.name not in drops}
     every = [
         replace(one, refitted_drop=drops.get(name), probability=probable.get(name, 0.0)) for name, one in found.items()
     ]

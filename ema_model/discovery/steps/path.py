@@ -98,25 +98,29 @@ class Story:
         """What the last model leaves."""
         return left_by(self.data, self.current)
 
-    def ranked(self, names: Sequence[str] | None = None, left: Left | None = None) -> list[Candidate]:
+    def ranked(self, names: Sequence[str] | None = None) -> list[Candidate]:
         """All effects (or these) with the fall of χ² that is predicted for each, the most promising first.
 
         What the model has no place for comes last, with the reason.
         """
+        left_out = self.looked_for(names)
+        return scored(self.current, self.prints) + left_out
+
+    def looked_for(self, names: Sequence[str] | None = None) -> list[Candidate]:
+        """Makes the fingerprints, `prints`, of all effects (or these); those that the model has no place for."""
         known = self.current.actuator.effects
         actuator = self.current.actuator
-        looked_for = [name for name in CATALOGUE if may_act(name, actuator)]
-        wanted = [name for name in names or looked_for if name not in known]
+        acting = [name for name in CATALOGUE if may_act(name, actuator)]
+        wanted = [name for name in names or acting if name not in known]
         barred = {name: reason for name in wanted if (reason := cannot_represent(actuator, name))}
         wanted = [name for name in wanted if name not in barred]
         given = [name for name in self.of_the_file if name not in {one.key for one in self.added}]
-        orders = (left or self.left()).orders
+        orders = self.left().orders
         if actuator.axes.motor == "linear":
             orders = orders[:_MOST_PITCHES]  # the rest are there to tell what noise is
         self.prints = fingerprints(self.data, self.current, wanted, orders)
         self.prints += of_the_file(self.current, [name for name in given if not names or name in names])
-        left_out = [Candidate(name, 0.0, {}, cannot_represent=reason) for name, reason in barred.items()]
-        return scored(self.current, self.prints) + left_out
+        return [Candidate(name, 0.0, {}, cannot_represent=reason) for name, reason in barred.items()]
 
     def signatures(self, ranked: Sequence[Candidate]) -> dict[str, Array]:
         """What each candidate, of the last `ranked`, would take from what is measured less the model.
@@ -250,6 +254,15 @@ class Story:
         if key in self.of_the_file:
             actuator = as_in(self.base.actuator, key, actuator)
         return fit(self.data, actuator, found.starts, tell, found.faults)
+
+    def finish(self, tell: Progress = lambda text: None) -> None:
+        """Fits the last model to its very end, with intervals, where it was refitted roughly."""
+        last = self.steps[-1]
+        if len(self.steps) == 1 or self.current.calibration.is_final:
+            return
+        found = fit(self.data, last.fit.actuator, last.fit.starts, tell, last.fit.faults)
+        self.steps.pop()
+        self._append(found, self._rung(last.rung.change, found), last.added)
 
     def settle(self, tell: Progress = lambda text: None) -> None:
         """Fits the models anew as what each leaves asks for, where what the last one leaves is no noise.

@@ -138,7 +138,7 @@ class Look:
 def assessed(story: Story) -> Assessment:
     """What the last model of a story leaves; takes a second, and the first time a compilation."""
     left = story.left()
-    ranked = with_faults(story, story.ranked(None, left))
+    ranked = with_faults(story, story.ranked())
     worth = [one for one in ranked if not one.obstacle]
     found = signatures(story, worth)
     rivals = {one.name: found[one.name] for one in worth if one.predicted_drop > _RIVAL and one.name in found}

@@ -179,7 +179,7 @@ class Walk:
         if self._ranked is None or self._ranked[0] is not self.story.current:
             self._tell("scoring the candidates")
             left = self.story.left()
-            self._ranked = self.story.current, left, self.story.ranked(self._names, left)
+            self._ranked = self.story.current, left, self.story.ranked(self._names)
         return self._ranked[1:]
 
     def _step(self) -> bool:

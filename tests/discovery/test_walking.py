@@ -25,7 +25,7 @@ def walk_of(monkeypatch, ranked, floors=50.0, simulates=True, fault=0.0):
         walking, "with_faults", lambda story, effects: sorted([*effects, play], key=lambda one: -one.predicted_drop)
     )
     current = SimpleNamespace(chi2=1000.0, plant=SimpleNamespace(simulates_commands=simulates))
-    story = SimpleNamespace(data=None, current=current, left=lambda: None, ranked=lambda names, left: ranked)
+    story = SimpleNamespace(data=None, current=current, left=lambda: None, ranked=lambda names: ranked)
     return walking.Walk(story, lambda text: None, None, 3)
 
 
@@ -103,7 +103,7 @@ def test_a_test_is_sought_only_for_rivals_of_the_last_model(added, alike):
 def test_candidates_are_scored_once_for_a_model(monkeypatch):
     asked = []
     walk = walk_of(monkeypatch, [DELAY])
-    walk.story.ranked = lambda names, left: asked.append(names) or [DELAY]
+    walk.story.ranked = lambda names: asked.append(names) or [DELAY]
     walk.suspects_drive()
     walk.suspects_drive()
     assert len(asked) == 1

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -180,11 +181,7 @@ def _inputs(
     """Command, load and supply at every step; linear between samples, but for jumps and the drive's switch."""
     time = measurement.time_s[run] - measurement.time_s[run.start]
     at = np.arange(steps) * step_s - actuator.sensors.delay_s
-    if put_in in CURRENT_INPUTS and measurement.side.sampling != "instantaneous":  # of each period its own mean
-        held = np.clip(np.floor(at / measurement.sample_period_s + 1e-6).astype(int) + 1, 0, time.size - 1)
-        command: Array = measurement[put_in][run][held].astype(float)
-    else:
-        command = between(at, time, measurement[put_in][run]).astype(float)
+    command = _put_in(measurement, put_in, run.start, run.stop, steps, step_s, actuator.sensors.delay_s)
     load = measurement.get("load_torque_Nm")
     loads = np.zeros(steps) if load is None else np.interp(at, time, load[run])
     bus = measurement.get("bus_voltage_V")
@@ -197,6 +194,20 @@ def _inputs(
         held = np.clip(np.searchsorted(time, at, side="right") - 1, 0, time.size - 1)
         supply = np.where(enabled[run][held] > 0.5, supply, 0.0)
     return command, loads, supply
+
+
+@lru_cache(maxsize=8)  # every model of a discovery is put beside the same recordings
+def _put_in(
+    measurement: Measurement, name: str, first: int, last: int, steps: int, step_s: float, delay_s: float
+) -> Array:
+    """What is put in at every step of a run, (steps,): shared by all windows of it, which only read it."""
+    run = slice(first, last)
+    time = measurement.time_s[run] - measurement.time_s[first]
+    at = np.arange(steps) * step_s - delay_s
+    if name in CURRENT_INPUTS and measurement.side.sampling != "instantaneous":  # of each period its own mean
+        held = np.clip(np.floor(at / measurement.sample_period_s + 1e-6).astype(int) + 1, 0, time.size - 1)
+        return np.asarray(measurement[name][run][held].astype(float))
+    return between(at, time, measurement[name][run]).astype(float)
 
 
 def _start(measurement: Measurement, actuator: Actuator, at: int) -> tuple[float, float, float]:

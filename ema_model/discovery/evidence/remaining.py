@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
 
@@ -46,7 +47,7 @@ class Left:
     @cached_property
     def orders(self) -> list[float]:
         """Those that the recordings can show, the strongest first."""
-        residuals = residuals_left(self.data, self.found)
+        residuals = _residuals(self.data, self.found, [{} for _ in self.found.plant.windows])
         return [one.order for one in _orders(residuals, _primary(residuals), self.found.actuator)]
 
     @cached_property
@@ -117,8 +118,13 @@ def used_left(data: Data, before: Fit, after: Fit) -> tuple[str, Array, Array]:
 @lru_cache(maxsize=4)  # of a fit and of the one before it
 def residuals_left(data: Data, found: Fit) -> Residuals:
     """The residuals of a fit beside the variables that may explain them."""
+    return _residuals(data, found, twins_of(found))
+
+
+def _residuals(data: Data, found: Fit, known: Sequence[dict[str, Array]]) -> Residuals:
+    """The same; known: the error that is known beforehand, by window."""
     fitted = found.calibration
-    return residuals_of(found.plant, data.floors, fitted.signals, twins_of(found), fitted.actuator, fitted)
+    return residuals_of(found.plant, data.floors, fitted.signals, known, fitted.actuator, fitted)
 
 
 def _primary(residuals: Residuals) -> str:

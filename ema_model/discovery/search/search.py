@@ -39,6 +39,7 @@ Progress = Callable[[str], None]
 _ANY_MISSING = 0.5  # probability that anything of the catalogue is missing
 _RECENTRED = 3  # times that a refit begins anew from where its first guess held it back
 _CLOSER = 12  # Terms that are looked at with the noise that each leaves
+_MADE_ANEW = 32  # Terms beside a further model, by what those of the first one tell beside it
 _REFITTED = 4
 _LEAST_SCORE = 2.0  # logarithm of the evidence, by algebra, from which on a refit may make it enough
 _NAMED = math.log(99.0)  # odds of 99 to 1
@@ -197,6 +198,8 @@ class Search(Walk):
         self._known: Round | None = None
         self._refitted: tuple[Round, list[Contender]] | None = None
         self._exchanges: set[tuple[str, str]] = set()  # that were tried
+        self._made: tuple[Data, list[Term]] | None = None  # all Terms of effects, beside an earlier model
+        self._hidden: Sequence[Candidate] = ()
 
     def _go_to_the_end(self) -> None:
         """Adds, exchanges and takes out what makes the model more probable."""
@@ -207,6 +210,10 @@ class Search(Walk):
             pass
         self._curve_instead()
         story.finish(tell)
+
+    def go(self) -> None:
+        """One step; beside as many effects as are asked for, of a fault alone."""
+        self._going = self._step()
 
     def drive_leaves(self) -> float:
         """What the best contenders of the drive leave, in floors."""
@@ -227,19 +234,45 @@ class Search(Walk):
         if self._known is None or self._known.beside is not found:
             noise = noise_of(story.data, found)
             self._tell("scoring the candidates")
-            barred = story.looked_for(self._names)
-            unseen = [Candidate(name, 0.0, {}, reason) for name, reason in hidden(found, story.prints).items()]
-            prints = [*story.prints, *_further_orders(story)]
-            best = scored_terms(found, terms_of(story.data, found, prints, noise), noise)
+            best = scored_terms(found, self._terms(noise), noise)
             before = evidence_of_fit(story.data, story.held, found, noise)
-            self._known = Round(found, noise, before, [*unseen, *barred], best)
+            self._known = Round(found, noise, before, self._hidden, best)
         return self._known
+
+    def _terms(self, noise: NoiseModel) -> list[Term]:
+        """The Terms beside the last model: the first time all of them, then anew those that might tell most.
+
+        What a Term changes depends little on what else is in the model: enough to know which are hopeless.
+        """
+        story, found = self.story, self.story.current
+        of, known = self._made or (None, [])
+        shown = story.left().orders
+        if of is not story.data or found.actuator.axes.motor == "linear":  # whose orders are the residual's
+            barred = story.looked_for(self._names or None)
+            unseen = [Candidate(name, 0.0, {}, reason) for name, reason in hidden(found, story.prints).items()]
+            self._hidden = [*unseen, *barred]
+            prints = [*story.prints, *_further_orders(story, shown)]
+            terms = terms_of(story.data, found, prints, noise, shown)
+            self._made = story.data, [one for one in terms if one.fingerprint and not one.fingerprint.frees]
+            return terms
+        about = AboutFit.of(found, noise)
+        own = evidence_of(noise, about.residual, about.unknowns)
+        gains = gains_of(noise, own, about.unknowns, [one.unknowns for one in known])
+        telling = [known[i] for i in np.argsort(-gains)[:_MADE_ANEW]]
+        names = {one.name for one in telling}
+        orders = sorted({one.fingerprint.settings["order"] for one in telling if "order" in one.fingerprint.settings})
+        present = found.actuator.effects
+        story.looked_for([name for name in CATALOGUE if name in names and name not in present], orders)
+        terms = terms_of(story.data, found, [*story.prints, *_further_orders(story, orders)], noise, shown)
+        return terms + [one for one in known if one.name not in names and one.name not in present]
 
     def _contenders(self) -> list[Contender]:
         """The few Terms that might be the best beside the last model, refitted, the most probable first."""
         story, seen = self.story, self._round()
         if self._refitted is None or self._refitted[0] is not seen:
-            chosen = [one for one in seen.best if one.gain > max(_LEAST_SCORE, _MIGHT * seen.best[0].gain)][:_REFITTED]
+            is_full = len({one.name for one in story.added}) >= self._most
+            room = [one for one in seen.best if one.term.fingerprint is None or not is_full]
+            chosen = [one for one in room if one.gain > max(_LEAST_SCORE, _MIGHT * room[0].gain)][:_REFITTED]
             trials = fits(lambda one, tell: refitted(story.data, seen.beside, one, tell), chosen, self._tell)
             found = []
             for one, trial in zip(chosen, trials):
@@ -395,16 +428,16 @@ def _simplest(named: Sequence[Contender]) -> Contender:
     return near[0] if near else first
 
 
-def _further_orders(story: Story) -> list[Fingerprint]:
-    """Fingerprints of the model's periodic effects at further orders."""
+def _further_orders(story: Story, orders: Sequence[float]) -> list[Fingerprint]:
+    """Fingerprints of the model's periodic effects at further orders, of these."""
     found = story.current
     present = found.actuator.effects
     names = {name for key in present if (name := catalogue_name(key)) in CATALOGUE and CATALOGUE[name].is_periodic}
     prints = []
     for name in sorted(names):
         known = [values["order"] for key, values in present.items() if catalogue_name(key) == name]
-        orders = [one for one in story.left().orders if all(abs(one - other) >= _APART for other in known)]
-        prints += fingerprints(story.data, found, [f"{name}_{len(known) + 1}"], orders)
+        apart = [one for one in orders if all(abs(one - other) >= _APART for other in known)]
+        prints += fingerprints(story.data, found, [f"{name}_{len(known) + 1}"], apart)
     return prints
 
 

@@ -8,7 +8,6 @@ catalogue and the actuator, never from the recordings.
 from __future__ import annotations
 
 import math
-from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
@@ -53,14 +52,6 @@ class Term:
         """It with these amounts among the candidates; drop: the fall of χ² that is predicted."""
         name = catalogue_name(self.name) if self.fingerprint else self.name
         return Candidate(name, max(0.0, drop), self.at(amounts, found))
-
-    @property
-    def order(self) -> float | None:
-        """Its order, where that is one of several, each as likely as the others: all else is found by a refit."""
-        if self.fingerprint is None or self.fingerprint.frees or "order" not in self.fingerprint.settings:
-            return None
-        is_whole = next(one for one in find(self.name).parameters if one.name == "order").integer
-        return self.fingerprint.settings["order"] if is_whole else None
 
 
 def noise_of(data: Data, found: Fit) -> NoiseModel:
@@ -139,17 +130,20 @@ def _of_catalogue(found: Fit, path: str) -> tuple[float, float]:
     return (about - value) / unit, max(spread / unit, 1e-6)
 
 
-def terms_of(data: Data, found: Fit, prints: Sequence[Fingerprint], noise: NoiseModel) -> list[Term]:
-    """The Terms of fingerprints, also without what does nothing by default, and of the actuator's faults."""
+def terms_of(
+    data: Data, found: Fit, prints: Sequence[Fingerprint], noise: NoiseModel, orders: Sequence[float]
+) -> list[Term]:
+    """The Terms of fingerprints, also without what does nothing by default, and of the actuator's faults.
+
+    orders: all that the recordings can show; a periodic effect is as likely at each of them.
+    """
     plain = [replace(one, columns=one.columns[:, :1], beside={}) for one in prints if one.beside]
-    terms = [_of_print(found, one, noise) for one in [*prints, *plain]]
+    terms = [_of_print(found, one, noise, orders) for one in [*prints, *plain]]
     terms += [_of_fault(found, *one, noise) for one in fault_columns(data, found)]
-    terms = [one for one in terms if float(np.max(np.abs(one.unknowns.columns))) > 0.0]
-    orders = Counter(name for name, order in {(one.name, one.order) for one in terms} if order is not None)
-    return [one if one.order is None else replace(one, log_share=-math.log(orders[one.name])) for one in terms]
+    return [one for one in terms if float(np.max(np.abs(one.unknowns.columns))) > 0.0]
 
 
-def _of_print(found: Fit, one: Fingerprint, noise: NoiseModel) -> Term:
+def _of_print(found: Fit, one: Fingerprint, noise: NoiseModel, orders: Sequence[float]) -> Term:
     effect = find(one.name, found.actuator.axes)
     first = effect.parameters[0]
     count = one.columns.shape[1]
@@ -167,7 +161,12 @@ def _of_print(found: Fit, one: Fingerprint, noise: NoiseModel) -> Term:
                     sigma[i] = 0.5 * (own[name].high - own[name].low) / abs(value)
             if first.low > 0.0:
                 low[0], high[0] = 0.0, np.inf
-    return Term(one.name, Unknowns(noise.coefficients(one.columns), np.zeros(count), sigma, low, high), one)
+    order = next((own for own in effect.parameters if own.name == "order"), None)
+    log_share = 0.0
+    if order is not None and order.integer and not one.frees:  # one that is no whole number is found by a refit
+        log_share = -math.log(max(1, sum(order.low <= at <= order.high for at in orders)))
+    unknowns = Unknowns(noise.coefficients(one.columns), np.zeros(count), sigma, low, high)
+    return Term(one.name, unknowns, one, log_share=log_share)
 
 
 def _of_fault(found: Fit, names: tuple[str, ...], step: float, columns: Array, noise: NoiseModel) -> Term:

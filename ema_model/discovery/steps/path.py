@@ -103,23 +103,26 @@ class Story:
 
         What the model has no place for comes last, with the reason.
         """
-        left_out = self.looked_for(names)
+        left_out = self.looked_for(names or None)
         return scored(self.current, self.prints) + left_out
 
-    def looked_for(self, names: Sequence[str] | None = None) -> list[Candidate]:
-        """Makes the fingerprints, `prints`, of all effects (or these); those that the model has no place for."""
+    def looked_for(self, names: Sequence[str] | None = None, orders: Sequence[float] | None = None) -> list[Candidate]:
+        """Makes the fingerprints, `prints`, of all effects (or these), at all orders that can be seen (or these).
+
+        Returned is what the model has no place for.
+        """
         known = self.current.actuator.effects
         actuator = self.current.actuator
         acting = [name for name in CATALOGUE if may_act(name, actuator)]
-        wanted = [name for name in names or acting if name not in known]
+        wanted = [name for name in (acting if names is None else names) if name not in known]
         barred = {name: reason for name in wanted if (reason := cannot_represent(actuator, name))}
         wanted = [name for name in wanted if name not in barred]
         given = [name for name in self.of_the_file if name not in {one.key for one in self.added}]
-        orders = self.left().orders
+        orders = self.left().orders if orders is None else orders
         if actuator.axes.motor == "linear":
             orders = orders[:_MOST_PITCHES]  # the rest are there to tell what noise is
         self.prints = fingerprints(self.data, self.current, wanted, orders)
-        self.prints += of_the_file(self.current, [name for name in given if not names or name in names])
+        self.prints += of_the_file(self.current, [name for name in given if names is None or name in names])
         return [Candidate(name, 0.0, {}, cannot_represent=reason) for name, reason in barred.items()]
 
     def signatures(self, ranked: Sequence[Candidate]) -> dict[str, Array]:

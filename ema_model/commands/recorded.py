@@ -17,17 +17,22 @@ _OF_A_CURVE = 2  # samples on either side that decide how it bends
 _LONGEST_SAMPLE_S = 0.02  # what is farther apart are corners of a profile, with slopes between them
 
 
-def between(at_s: Array, time_s: Array, command: Array) -> Array:
+def between(at_s: Array, time_s: Array, command: Array, *, moving: bool = False) -> Array:
     """A sampled command (n,) at other times: smooth between samples, but a jump comes with the sample that shows it.
 
-    Constant outside.  Holding every sample would add 0.05 A to the fit of a chirp; a jump drawn as a slope begins up
-    to a sample early, which is 3 A in the first half millisecond of a step sampled at 10 kHz; and chords leave a sine
-    of 0.03 rad and 3 Hz, sampled at 500 Hz, by 5e-6 rad, where Akima's curve is off by 1e-7; corners stay corners.
+    Constant outside; moving: before the first sample it came as it goes on from there, since a log that begins in mid
+    motion, and is late by a part of a sample, would else begin with a jump of the command's speed.  Holding every
+    sample would add 0.05 A to the fit of a chirp; a jump drawn as a slope begins up to a sample early, which is 3 A in
+    the first half millisecond of a step sampled at 10 kHz; and chords leave a sine of 0.03 rad and 3 Hz, sampled at
+    500 Hz, by 5e-6 rad, where Akima's curve is off by 1e-7; corners stay corners.
     """
     values = np.interp(at_s, time_s, command)
     if len(command) <= 2:
         return values
     change, step_s = jumps(command), np.diff(time_s)
+    if moving and not change[0] and step_s[0] > 0.0:
+        early = at_s < time_s[0]
+        values[early] += (at_s[early] - time_s[0]) * (command[1] - command[0]) / step_s[0]
     near = step_s <= _LONGEST_SAMPLE_S
     last = np.clip(np.searchsorted(time_s, at_s + _ROUNDING_S, side="right") - 1, 0, len(time_s) - 1)
     if np.all(step_s > 0.0):

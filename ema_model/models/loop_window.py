@@ -207,7 +207,7 @@ def _put_in(
     if name in CURRENT_INPUTS and measurement.side.sampling != "instantaneous":  # of each period its own mean
         held = np.clip(np.floor(at / measurement.sample_period_s + 1e-6).astype(int) + 1, 0, time.size - 1)
         return np.asarray(measurement[name][run][held].astype(float))
-    return between(at, time, measurement[name][run]).astype(float)
+    return between(at, time, measurement[name][run], moving=True).astype(float)
 
 
 def _start(measurement: Measurement, actuator: Actuator, at: int) -> tuple[float, float, float]:

@@ -170,6 +170,17 @@ def test_a_sampled_command_goes_smoothly_between_its_samples_and_keeps_its_corne
     assert set(np.unique(step)) == {0.0, 0.005}
 
 
+def test_a_log_that_begins_in_mid_motion_and_is_late_goes_on_from_before_its_first_sample():
+    time = np.arange(501) / 500.0
+    late = np.arange(0.0, 0.5, 1e-4) - 7e-4
+    moving = between(late, time, 0.03 * np.sin(20.0 * time), moving=True)
+    np.testing.assert_allclose(moving, 0.03 * np.sin(20.0 * late), atol=2e-6)
+    speeds = np.diff(moving) / 1e-4
+    assert np.ptp(speeds[:20]) < 0.01, "it begins as fast as it goes on, which an acceleration feedforward answers to"
+    step = between(late, time, np.where(time > 0.0, 0.005, 0.0), moving=True)
+    assert step[0] == 0.0 and set(np.unique(step)) == {0.0, 0.005}
+
+
 @pytest.mark.parametrize("digits", [None, 9])
 def test_how_numbers_are_rounded_is_no_jump(digits):
     """Between two places the command stands at numbers that are not round, and so does what is interpolated there."""

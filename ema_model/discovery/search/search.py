@@ -198,7 +198,7 @@ class Search(Walk):
         self._known: Round | None = None
         self._refitted: tuple[Round, list[Contender]] | None = None
         self._exchanges: set[tuple[str, str]] = set()  # that were tried
-        self._made: tuple[Data, list[Term]] | None = None  # all Terms of effects, beside an earlier model
+        self._made: list[Term] | None = None  # all Terms of effects, beside an earlier model
         self._hidden: Sequence[Candidate] = ()
 
     def _go_to_the_end(self) -> None:
@@ -245,15 +245,14 @@ class Search(Walk):
         What a Term changes depends little on what else is in the model: enough to know which are hopeless.
         """
         story, found = self.story, self.story.current
-        of, known = self._made or (None, [])
-        shown = story.left().orders
-        if of is not story.data or found.actuator.axes.motor == "linear":  # whose orders are the residual's
+        known, shown = self._made, story.left().orders
+        if known is None or found.actuator.axes.motor == "linear":  # whose orders are the residual's
             barred = story.looked_for(self._names or None)
             unseen = [Candidate(name, 0.0, {}, reason) for name, reason in hidden(found, story.prints).items()]
             self._hidden = [*unseen, *barred]
             prints = [*story.prints, *_further_orders(story, shown)]
             terms = terms_of(story.data, found, prints, noise, shown)
-            self._made = story.data, [one for one in terms if one.fingerprint and not one.fingerprint.frees]
+            self._made = [one for one in terms if one.fingerprint and not one.fingerprint.frees]
             return terms
         about = AboutFit.of(found, noise)
         own = evidence_of(noise, about.residual, about.unknowns)
@@ -302,6 +301,7 @@ class Search(Walk):
             self._rivals = [first.trial, *others]
         names = {trial.candidate.name for trial in (first.trial, *others)}
         story.add(first.trial, ties=[trial.candidate.name for trial in others])
+        story.finish(self._tell)
         if not first.trial.faults:
             probable = _probabilities(seen, contenders)
             story.set_probability(min(1.0, sum(probable[name] for name in names)))

@@ -20,7 +20,7 @@ from ema_model.discovery.candidates.fingerprints import Fingerprint, fingerprint
 from ema_model.discovery.candidates.refit import Trial, again, is_near, promising, stands_for, tried
 from ema_model.discovery.candidates.score import scored, signatures
 from ema_model.discovery.candidates.unknown import curve_for
-from ema_model.discovery.criteria import LEAST_BIC
+from ema_model.discovery.criteria import FAR, HALF, LEAST_BIC
 from ema_model.discovery.evidence.counted import predicted_evidence
 from ema_model.discovery.evidence.remaining import Left, at_floor, left_by
 from ema_model.discovery.evidence.uncertainty import settled
@@ -30,7 +30,7 @@ from ema_model.discovery.observed.two_masses import TwoMasses
 from ema_model.discovery.result import Added, Candidate, Change, Contradiction, Rung
 from ema_model.discovery.steps.step import Step, change_of, refreshed, rung_of, stood_in
 from ema_model.effects import CATALOGUE, catalogue_name, find
-from ema_model.estimation.model_fit import Data, Fit, as_in, fit, in_floors_of, without_effect
+from ema_model.estimation.model_fit import Data, Fit, as_in, fit, floor_ratio, in_floors_of, without_effect
 from ema_model.faults import NAMES as FAULTS
 from ema_model.faults import cause_of
 from ema_model.side_by_side import fits
@@ -259,12 +259,24 @@ class Story:
         return fit(self.data, actuator, found.starts, tell, found.faults)
 
     def finish(self, tell: Progress = lambda text: None) -> None:
-        """Fits the last model to its very end, with intervals, where it was refitted roughly."""
+        """Fits the last model to its very end, with intervals, where it was refitted roughly.
+
+        How far a model is from its three-phase twin goes with how it moves: where the one before it moved otherwise,
+        since it left twice as much or more, the floor is measured anew beside this one.
+        """
         last = self.steps[-1]
-        if len(self.steps) == 1 or self.current.calibration.is_final:
+        if len(self.steps) == 1 or last.fit.calibration.is_final:
             return
+        fits = [step.fit for step in self.steps[-2:]]
+        before, after = (floor_ratio(self.data, one.plant, one.calibration.signals) for one in fits)
+        moves_otherwise = before > FAR and after < HALF * before
+        if moves_otherwise:
+            self.data = self.data.beside(last.fit)
+            self.held = None if self.held is None else self.held.beside(last.fit)
         found = fit(self.data, last.fit.actuator, last.fit.starts, tell, last.fit.faults)
         self.steps.pop()
+        if moves_otherwise:
+            self._tell_in_floors_of(found)
         self._append(found, self._rung(last.rung.change, found), last.added)
 
     def settle(self, tell: Progress = lambda text: None) -> None:

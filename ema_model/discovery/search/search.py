@@ -289,6 +289,7 @@ class Search(Walk):
         first = _simplest(named)
         name = first.trial.candidate.name
         alike = [one.trial for one in named if one is not first and not first.is_told_apart_from(one)]
+        as_probable = {one.candidate.name for one in [first.trial, *alike]}  # terms of a series among them
         alike = [trial for trial in alike if trial.faults or name not in find(trial.candidate.name).terms]
         faults = [trial for trial in alike if trial.faults]
         effects = without_series([trial for trial in alike if not trial.faults])
@@ -299,12 +300,11 @@ class Search(Walk):
             return False
         if others and not self._rivals:
             self._rivals = [first.trial, *others]
-        names = {trial.candidate.name for trial in (first.trial, *others)}
         story.add(first.trial, ties=[trial.candidate.name for trial in others])
         story.finish(self._tell)
         if not first.trial.faults:
             probable = _probabilities(seen, contenders)
-            story.set_probability(min(1.0, sum(probable[name] for name in names)))
+            story.set_probability(min(1.0, sum(probable[name] for name in as_probable)))
         return True
 
     def _objection(self, one: Contender) -> bool:

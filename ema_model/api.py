@@ -30,6 +30,8 @@ from ema_model.discovery import Discovery
 from ema_model.discovery.steps.begin import with_fitted_effects
 from ema_model.effects import find
 from ema_model.errors import InputError, quoted
+from ema_model.exports import export as exporting
+from ema_model.exports.result import Export
 from ema_model.faults import vector
 from ema_model.fleet.compare import compare_units as compared_units
 from ema_model.fleet.result import UnitsCompared
@@ -51,6 +53,7 @@ __all__ = [
     "compare",
     "compare_units",
     "discover",
+    "export",
     "health",
     "identify",
     "load_actuator",
@@ -370,6 +373,28 @@ def identify(
         on_iteration=on_iteration,
         **settings,
     )
+
+
+@_checked
+def export(
+    actuator: Actuator,
+    out: str | os.PathLike[str],
+    to: Sequence[str] = ("c",),
+    of: Recordings = (),
+    *,
+    name: str = "",
+    on_progress: Callable[[str], None] | None = None,
+) -> Export:
+    """The model for other tools, each replayed on recordings, with its loss beside the monitor model's.
+
+    actuator: as loaded, calibrated or improved.
+    out: the folder that is written, which is new or empty.
+    to: targets: "c", "python".
+    of: files' names or recordings to replay; without any, a run is made for it.
+    name: of files and functions; the actuator's own without one.
+    on_progress: takes a text that says what goes on; what it raises ends the export, and nothing is written.
+    """
+    return exporting.export(actuator, to, _read(of, actuator), out, name=name, on_progress=on_progress)
 
 
 @_checked

@@ -11,6 +11,7 @@ import hashlib
 import importlib
 import importlib.abc
 import importlib.util
+import linecache
 import os
 import sys
 import threading
@@ -208,7 +209,10 @@ class _Modules(importlib.abc.MetaPathFinder, importlib.abc.Loader):
     def exec_module(self, module: ModuleType) -> None:
         package, dot, name = module.__name__.partition(".")
         if name == "composition":
-            code = compile(_compositions[package], f"<{module.__name__}>", "exec")
+            composed, file = _compositions[package], f"<{module.__name__}>"
+            # for whoever reads the functions' sources: tracebacks, and what exports them
+            linecache.cache[file] = (len(composed), None, composed.splitlines(keepends=True), file)
+            code = compile(composed, file, "exec")
         else:
             source = importlib.util.find_spec(f"ema_model.kernels{dot}{name}")
             if source is None or not isinstance(source.loader, importlib.abc.InspectLoader):

@@ -22,7 +22,7 @@ FLOORS = {
         ["recordings", "side_by_side"],
         ["simulation"],
         ["models"],
-        ["estimation"],
+        ["estimation", "exports"],
         ["identification", "comparison", "challenges"],
         ["discovery", "tracking"],
         ["simulated_lives", "fleet"],

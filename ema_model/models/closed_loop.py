@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from copy import copy
 from dataclasses import replace
-from typing import Self
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -187,7 +187,7 @@ class ClosedLoop:
         now, then = (self._simulated(one, k=k) for one in (window, later))
         return {name: then[name][0] - now[name][0] for name in now}
 
-    def _simulated(
+    def begun(
         self,
         window: LoopWindow,
         actuator: Actuator | None = None,
@@ -196,7 +196,11 @@ class ClosedLoop:
         play_rad: ArrayLike = 0.0,
         faster_rad_s: ArrayLike = 0.0,
         effects: Effects | None = None,
-    ) -> Signals:
+    ) -> tuple[Actuator, Array, Array]:
+        """A window as kernels take it: the actuator as it was in it, its parameters and its state, (blocks, rows·LANES).
+
+        The others as in `signals`.
+        """
         actuator = (actuator or self.actuator).varied(window.values)
         k = np.atleast_2d(np.asarray(actuator.k if k is None else k, dtype=float))
         if window.input == "motor_torque_Nm":  # which is put in as it is
@@ -216,7 +220,19 @@ class ClosedLoop:
             window.integral_Nm(actuator, k, turned_rad, play_rad),
             window.begins_s,
         )
-        lanes = np.empty((4, len(k), window.blocks))
+        return actuator, rows, state
+
+    def _simulated(
+        self,
+        window: LoopWindow,
+        actuator: Actuator | None = None,
+        k: ArrayLike | None = None,
+        *moved: Any,
+    ) -> Signals:
+        """Of `signals`; moved: the rest of its arguments."""
+        actuator, rows, state = self.begun(window, actuator, k, *moved)
+        count = len(np.atleast_2d(np.asarray(actuator.k if k is None else k)))
+        lanes = np.empty((4, count, window.blocks))
         steps = window.steps_per_block
         for first in range(0, window.blocks, _CHUNK):  # long recordings would fill the memory with lanes
             part = slice(first, min(first + _CHUNK, window.blocks))
@@ -227,15 +243,15 @@ class ClosedLoop:
             for block, shown in enumerate(result):
                 ours = lanes[:, block * LANES : (block + 1) * LANES, part]
                 ours[...] = shown.transpose(1, 2, 0)[:, : ours.shape[1]]
-        return self._sensed(dict(zip(COMPARED, lanes)), actuator, window.block_s)
+        return self.sensed(dict(zip(COMPARED, lanes)), actuator, window.block_s)
 
     def _measured(self, window: LoopWindow, actuator: Actuator, shown: Signals) -> Signals:
         """Of a model's samples (n, samples) after the start, what was measured, as sensors show it: (n, blocks)."""
         blocks = {name: shown[name].reshape(len(shown[name]), -1, window.samples_per_block) for name in COMPARED}
-        sensed = self._sensed({name: of.mean(axis=2) for name, of in blocks.items()}, actuator, window.block_s)
+        sensed = self.sensed({name: of.mean(axis=2) for name, of in blocks.items()}, actuator, window.block_s)
         return {name: sensed[name] for name in window.measured}
 
-    def _sensed(self, true: Signals, actuator: Actuator, block_s: float) -> Signals:
+    def sensed(self, true: Signals, actuator: Actuator, block_s: float) -> Signals:
         """Signals (n, blocks) as the actuator's sensors show them."""
         sensors = actuator.sensors
         gain, bias = _each(sensors.current_gain), _each(sensors.current_bias_A)

@@ -94,6 +94,18 @@ def free_motion(recordings: Sequence[Measurement], actuator: Actuator, offset: f
     The sensors' gain, bias and delay are taken off the recorded current, and the apparent inertia of a current loop
     stands beside the motor's own, as in `InverseDynamics`.  Raises InputError for recordings that cannot be simulated.
     """
+    model, offsets = driven_freely(recordings, actuator, offset)
+    sizes = [_size(model, recording) for recording in range(len(recordings))]
+    less, more = (
+        [offset + sign * _FINEST_OFFSET * size for offset, size in zip(offsets, sizes)] for sign in (-1.0, 1.0)
+    )
+    return FreeMotion(model.windows, _moved(model, offsets), offsets, [_moved(model, one) for one in (less, more)])
+
+
+def driven_freely(
+    recordings: Sequence[Measurement], actuator: Actuator, offset: float | None = None
+) -> tuple[ClosedLoop, list[float]]:
+    """The model of `free_motion` before its offsets are put in, and these, by recording."""
     even = [on_even_grid(one) for one in recordings]
     ratio = 1.0 + float(actuator.sensors.apparent_inertia)
     bare = actuator.varied({"motor.inertia_kgm2": actuator.motor.inertia_kgm2 * ratio}).in_open_loop()
@@ -103,11 +115,7 @@ def free_motion(recordings: Sequence[Measurement], actuator: Actuator, offset: f
     if offset is None:
         coarse = model.at_longer_steps(_OFFSET_STEP_S)
         offsets = [_best_offset(coarse, recording) for recording in range(len(even))]
-    sizes = [_size(model, recording) for recording in range(len(even))]
-    less, more = (
-        [offset + sign * _FINEST_OFFSET * size for offset, size in zip(offsets, sizes)] for sign in (-1.0, 1.0)
-    )
-    return FreeMotion(model.windows, _moved(model, offsets), offsets, [_moved(model, one) for one in (less, more)])
+    return model, offsets
 
 
 def _as_put_in(measurement: Measurement, actuator: Actuator) -> Measurement:

@@ -38,6 +38,7 @@ class Parser(argparse.ArgumentParser):
         given = sys.argv[1:] if args is None else list(args)
         if self._subparsers is None:
             self._refuse_unknown(given)
+            given = self._files_together(given)
         parsed, rest = super().parse_known_args(given, namespace)
         if rest:
             self.error(f"unexpected {' '.join(map(quoted, rest))}")
@@ -50,10 +51,39 @@ class Parser(argparse.ArgumentParser):
             if name.startswith("--") and " " not in name and not any(o.startswith(name) for o in self.option_names):
                 self.error(f"no option {quoted(name)}{did_you_mean(name, self.option_names)}")
 
+    def _files_together(self, given: Sequence[str]) -> list[str]:
+        """The same with all that is no option behind the options: argparse takes a list of files in one piece only."""
+        options: list[str] = []
+        others: list[str] = []
+        rest = list(given)
+        while rest:
+            text = rest.pop(0)
+            if text == "--":
+                return [*options, *others, text, *rest]
+            if not text.startswith("-") or text == "-" or _is_number(text):
+                others.append(text)
+                continue
+            options.append(text)
+            name, equals, _ = text.partition("=")
+            known = [action for option, action in self._option_string_actions.items() if option == name] or [
+                action for option, action in self._option_string_actions.items() if option.startswith(name)
+            ]
+            if known and known[0].nargs is None and not equals and rest:
+                options.append(rest.pop(0))
+        return [*options, *others]
+
     @property
     def option_names(self) -> list[str]:
         """The long ones, in order."""
         return [name for name in self._option_string_actions if name.startswith("--")]
+
+
+def _is_number(text: str) -> bool:
+    try:
+        float(text)
+    except ValueError:
+        return False
+    return True
 
 
 class _Version(argparse.Action):

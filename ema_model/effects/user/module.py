@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import linecache
 import sys
 import threading
 from collections.abc import Sequence
@@ -48,6 +49,8 @@ def generated_module(kind: str, kernels: str, parameters: Sequence[str] = ()) ->
 @cache
 def _module(name: str, source: str) -> ModuleType:
     module = ModuleType(f"ema_model_{name}")
-    exec(compile(source, f"<{module.__name__}>", "exec"), vars(module))
+    file = f"<{module.__name__}>"
+    linecache.cache[file] = (len(source), None, source.splitlines(keepends=True), file)  # as a stack's composition
+    exec(compile(source, file, "exec"), vars(module))
     sys.modules[module.__name__] = module  # a stack's composition imports it by this name
     return module

@@ -1,0 +1,1 @@
+"""The corrected model for other tools: C, FMU, MJCF and Python, each replayed on recordings with its loss."""

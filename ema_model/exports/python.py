@@ -57,13 +57,14 @@ def _function(one: Function) -> str:
 def _statement(one: Statement) -> list[str]:
     match one:
         case Assign(targets=(), value=value):
-            return _wrapped(_text(value))
+            return _wrapped("", value)
         case Assign(targets=targets, value=value):
-            return _wrapped(f"{', '.join(map(_text, targets))} = {_text(value)}")
+            places = ", ".join(map(_text, targets))
+            return _wrapped(f"({places}) = " if len(targets) > 3 else f"{places} = ", value)
         case If(test=test, body=body):
             return [f"if anywhere({_text(test)}):", *(f"    {line}" for it in body for line in _statement(it))]
         case Return(values=values):
-            return _wrapped(f"return {', '.join(map(_text, values))}".rstrip())
+            return _wrapped("return ", *values)
     raise TypeError(one)
 
 
@@ -118,16 +119,13 @@ def _variable(name: str) -> str:
     return f"{name}_" if name in _OWN or keyword.iskeyword(name) else name
 
 
-def _wrapped(line: str) -> list[str]:
-    """A long line within its parentheses, which Python lets it go on in."""
-    if len(line) <= _WIDTH:
-        return [line]
-    if line.startswith("return ") and "(" not in line:
-        line = f"return ({line.removeprefix('return ')})"
-    head, equals, value = line.partition(" = ")
-    if equals and not value.endswith(")"):
-        line = f"{head} = ({value})"
-    return textwrap.wrap(line, _WIDTH, subsequent_indent="    ", break_long_words=False, break_on_hyphens=False)
+def _wrapped(head: str, *values: Expression) -> list[str]:
+    """A line, or several within parentheses, which Python lets it go on in."""
+    text = ", ".join(map(_text, values))
+    if len(head) + len(text) <= _WIDTH:
+        return [f"{head}{text}".rstrip()]
+    lines = textwrap.wrap(text, _WIDTH - 4, break_long_words=False, break_on_hyphens=False)
+    return [f"{head}(", *(f"    {line}" for line in lines), ")"]
 
 
 # --- the file ---------------------------------------------------------------------------------------------------------

@@ -383,18 +383,20 @@ def export(
     of: Recordings = (),
     *,
     name: str = "",
+    fmi: str = "3.0",
     on_progress: Callable[[str], None] | None = None,
 ) -> Export:
     """The model for other tools, each replayed on recordings, with its loss beside the monitor model's.
 
     actuator: as loaded, calibrated or improved.
     out: the folder that is written, which is new or empty.
-    to: targets: "c", "python".
+    to: targets: "c", "fmu", "python".
     of: files' names or recordings to replay; without any, a run is made for it.
     name: of files and functions; the actuator's own without one.
+    fmi: the version of FMUs: "3.0" or "2.0".
     on_progress: takes a text that says what goes on; what it raises ends the export, and nothing is written.
     """
-    return exporting.export(actuator, to, _read(of, actuator), out, name=name, on_progress=on_progress)
+    return exporting.export(actuator, to, _read(of, actuator), out, name=name, fmi=fmi, on_progress=on_progress)
 
 
 @_checked

@@ -44,7 +44,7 @@ _WORDS = {  # that no variable can be called
     *("while main abs fabs floor sqrt pow sin cos exp log time clock signal div remainder gamma j0 j1 y0 y1 s p").split(),
 }
 _WIDTH = 110
-_SHOWN = ("current", "motor_speed", "motor_position", "user_position")
+SHOWN = ("current", "motor_speed", "motor_position", "user_position")
 
 # --- expressions and functions ----------------------------------------------------------------------------------------
 
@@ -193,7 +193,7 @@ def header(one: Exported) -> str:
     about = [f"{_plain(one.given.name)}: {_plain(one.given.description)}".rstrip(": "), *one.notes]
     shown = "\n".join(
         f"double {n}_{name}(const {n}_state *s, const {n}_parameters *p); /* {_of(out)} */"
-        for name, out in zip(_SHOWN, one.outputs)
+        for name, out in zip(SHOWN, one.outputs)
     )
     return f"""\
 /* {_comment(about)}
@@ -257,7 +257,7 @@ def source(one: Exported) -> str:
     readings = (*(_call(entries[f"shown_{name}"]) for name in ("current", "speed", "angle")), "s->told")
     shown = "\n".join(
         f"double {n}_{name}(const {n}_state *s, const {n}_parameters *p)\n{{\n    return {text};\n}}\n"
-        for name, text in zip(_SHOWN, readings)
+        for name, text in zip(SHOWN, readings)
     )
     return f"""\
 /* {_plain(one.given.name)}: exported by emaviz; see {n}.h.  Compile without fused sums (-ffp-contract=off), so that

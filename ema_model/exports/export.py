@@ -11,7 +11,7 @@ from pathlib import Path
 
 from ema_model.actuator import Actuator
 from ema_model.errors import InputError, did_you_mean, quoted
-from ema_model.exports import c, python
+from ema_model.exports import c, fmu, python
 from ema_model.exports.exported import Exported, exported
 from ema_model.exports.replay import Proof, proof_of, replayed, shortened
 from ema_model.exports.result import Export, TargetProof
@@ -19,8 +19,20 @@ from ema_model.recordings import Measurement
 
 Progress = Callable[[str], None]
 
-NAMES = ("c", "python")  # of targets
+NAMES = ("c", "fmu", "python")  # of targets
 _MOST_PYTHON_STEPS = 20_000  # of a proof: each takes a fifth of a millisecond
+_MOST_FMU_STEPS = 500_000  # each takes ten microseconds
+
+
+@dataclass(frozen=True)
+class Order:
+    """What a target is written of, and where."""
+
+    one: Exported
+    folder: Path
+    proof: Proof
+    fmi: str  # the version of FMUs
+    progress: Progress
 
 
 @dataclass(frozen=True)
@@ -29,32 +41,49 @@ class Target:
 
     title: str
     check: Callable[[], object]  # raises InputError where what it needs is not there
-    write: Callable[[Exported, Path, Proof, Progress], TargetProof]
+    write: Callable[[Order], TargetProof]
 
 
-def _write_c(one: Exported, folder: Path, proof: Proof, progress: Progress) -> TargetProof:
+def _write_c(order: Order) -> TargetProof:
+    one = order.one
     names = f"{one.name}.h", f"{one.name}.c"
     for name, text in zip(names, (c.header(one), c.source(one))):
-        (folder / name).write_text(text, encoding="utf-8")
-    progress("compiling the C")
+        (order.folder / name).write_text(text, encoding="utf-8")
+    order.progress("compiling the C")
     with tempfile.TemporaryDirectory(prefix="emaviz-export-") as scratch:
         for name in names:
-            shutil.copy(folder / name, scratch)
-        losses = replayed(proof, c.CompiledC(one, Path(scratch)), progress)
+            shutil.copy(order.folder / name, scratch)
+        losses = replayed(order.proof, c.CompiledC(one, Path(scratch)), order.progress)
     compiled = f"compiled by {Path(c.compiler()).name} {' '.join(c.FLAGS)}"
     return TargetProof("c", "C", names, compiled, tuple(losses))
 
 
-def _write_python(one: Exported, folder: Path, proof: Proof, progress: Progress) -> TargetProof:
-    name = f"{one.name}.py"
-    (folder / name).write_text(python.source(one), encoding="utf-8")
-    losses = replayed(shortened(proof, _MOST_PYTHON_STEPS), python.ImportedPython(one, folder), progress)
+def _write_fmu(order: Order) -> TargetProof:
+    path = order.folder / f"{order.one.name}.fmu"
+    order.progress("compiling the FMU")
+    fmu.write_fmu(order.one, path, order.fmi)
+    if problems := fmu.problems_of(path):
+        raise InputError(f"the FMU is not valid: {problems[0]}")
+    with tempfile.TemporaryDirectory(prefix="emaviz-export-") as scratch:
+        running = fmu.RunningFmu(order.one, path, Path(scratch))
+        losses = replayed(shortened(order.proof, _MOST_FMU_STEPS), running, order.progress)
+    checked = f"FMI {order.fmi} co-simulation, valid by fmpy and run in it"
+    return TargetProof("fmu", "FMU", (path.name,), checked, tuple(losses))
+
+
+def _write_python(order: Order) -> TargetProof:
+    name = f"{order.one.name}.py"
+    (order.folder / name).write_text(python.source(order.one), encoding="utf-8")
+    run = python.ImportedPython(order.one, order.folder)
+    losses = replayed(shortened(order.proof, _MOST_PYTHON_STEPS), run, order.progress)
     return TargetProof("python", "Python", (name,), "run with numpy", tuple(losses))
 
 
-TARGETS = dict(
-    zip(NAMES, (Target("C", c.compiler, _write_c), Target("Python", lambda: None, _write_python)), strict=True)
-)
+TARGETS = {
+    "c": Target("C", c.compiler, _write_c),
+    "fmu": Target("FMU", fmu.check, _write_fmu),
+    "python": Target("Python", lambda: None, _write_python),
+}
 
 
 def export(
@@ -64,11 +93,13 @@ def export(
     out: str | os.PathLike[str],
     *,
     name: str = "",
+    fmi: str = fmu.VERSIONS[0],
     on_progress: Progress | None = None,
 ) -> Export:
     """Writes the targets into a new folder, each replayed on the recordings; nothing is written where one fails.
 
-    targets: of `TARGETS`; out: the folder; name: of the files, the actuator's own without one.
+    targets: of `TARGETS`; out: the folder; name: of the files, the actuator's own without one;
+    fmi: the version of FMUs, of `fmu.VERSIONS`.
     Raises InputError for a target that does not exist or whose tools are not there, a folder that holds something,
     effects that have no form, and recordings that cannot be replayed.
     """
@@ -80,6 +111,8 @@ def export(
             raise InputError(f"no target {quoted(target)!r}; targets are {', '.join(TARGETS)}{like}")
     if not wanted:
         raise InputError(f"name a target to export to: {', '.join(TARGETS)}")
+    if fmi not in fmu.VERSIONS:
+        raise InputError(f"no version {quoted(fmi)!r} of FMI; there are {' and '.join(fmu.VERSIONS)}")
     folder = check_folder(out)
     for target in wanted:
         TARGETS[target].check()
@@ -90,7 +123,7 @@ def export(
         proofs = []
         for target in wanted:
             progress(f"writing {TARGETS[target].title}")
-            proofs.append(TARGETS[target].write(one, draft, proof, progress))
+            proofs.append(TARGETS[target].write(Order(one, draft, proof, fmi, progress)))
         found = Export(one, str(out), tuple(proofs), proof.simulated, tuple(m.name for m in recordings))
         draft.chmod(0o777 & ~_umask())
         shutil.rmtree(draft / "__pycache__", ignore_errors=True)

@@ -26,6 +26,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--out", required=True, type=options.Folder(), metavar="DIR", help="the folder to write, new or empty"
     )
     parser.add_argument("--name", default="", metavar="NAME", help="of files and functions; the actuator's without it")
+    parser.add_argument(
+        "--fmi", choices=stated_in("ema_model.exports.fmu", "VERSIONS"), default="3.0", help="the version of an FMU"
+    )
     options.add_mapping(parser)
     options.add_json(parser)
     parser.set_defaults(runs=None, start_s=None, stop_s=None)  # recordings are replayed as they are
@@ -55,7 +58,13 @@ def run(arguments: argparse.Namespace) -> int:
         names = [name for text in arguments.files for name in files_of(text)]
         recordings = option_values.read_files(names, arguments, actuator, progress)
         result = export(
-            actuator, arguments.to, recordings, arguments.out, name=arguments.name, on_progress=progress.show
+            actuator,
+            arguments.to,
+            recordings,
+            arguments.out,
+            name=arguments.name,
+            fmi=arguments.fmi,
+            on_progress=progress.show,
         )
         return flow.finish(arguments, flow.Answer(result, as_dict(result)), progress)
     finally:

@@ -38,11 +38,11 @@ from ema_model.exports.program import (
 Array = NDArray[np.float64]
 
 FLAGS = ("-std=c99", "-Wall", "-Werror", "-ffp-contract=off", "-O2")
-_WORDS = {  # that no variable can be called
-    *("auto break case char const continue default do double else enum extern float for goto if inline int long").split(),
-    *("register restrict return short signed sizeof static struct switch typedef union unsigned void volatile").split(),
-    *("while main abs fabs floor sqrt pow sin cos exp log time clock signal div remainder gamma j0 j1 y0 y1 s p").split(),
-}
+_WORDS = set(  # that no variable can be called
+    "auto break case char const continue default do double else enum extern float for goto if inline int long register "
+    "restrict return short signed sizeof static struct switch typedef union unsigned void volatile while main abs fabs "
+    "floor sqrt pow sin cos tan tanh exp log time clock signal div remainder gamma j0 j1 y0 y1 s p".split()
+)
 _WIDTH = 110
 SHOWN = ("current", "motor_speed", "motor_position", "user_position")
 
@@ -224,7 +224,7 @@ typedef struct {{
 
 extern const {n}_parameters {n}_defaults;
 
-/* At rest or in motion: where the motor stands, as the user's position; its speed; the place in the play, 0 the middle. */
+/* At rest or in motion: where the motor stands, as the user's position; speed; place in the play, 0 the middle. */
 void {n}_init({n}_state *s, const {n}_parameters *p, double user_position, double motor_speed, double play);
 
 /* What the sensors tell, anew, where fields of the state were set by hand. */

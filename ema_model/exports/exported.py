@@ -100,7 +100,9 @@ def exported(actuator: Actuator, name: str = "") -> Exported:
         shown = f"{sensors.current_gain:g} times the current here, and {sensors.current_bias_A:+g} A".replace("-", "−")
         notes.append(f"Its recordings show {shown}; their sensor is no part of the export.")
     if sensors.delay_s != 0.0:
-        notes.append(f"Its recordings are {1e3 * sensors.delay_s:g} ms late; that is no part of the export.".replace("-", "−"))
+        notes.append(
+            f"Its recordings are {1e3 * sensors.delay_s:g} ms late; that is no part of the export.".replace("-", "−")
+        )
     stack = own_stack(taken)
     program = program_of(stack)
     rows = dict(zip(stack.parameter_rows, monitor_rows(taken, taken.k, stack, {})[0].reshape(-1, LANES)[:, 0]))
@@ -179,7 +181,9 @@ def _base(actuator: Actuator) -> dict[str, tuple[str, str]]:
     found["position_gain"] = ("1/rad" if is_loop else "1/s", f"{gain} asked for per position error at the user")
     is_duty = actuator.circuit() == "voltage"
     found["output_limit"] = ("" if is_duty else "A", "the most that the controller asks for")
-    found |= {f"flux_{i}": ("", "of the windings' torque over the rotor's angle; 1, 0, 0 … of healthy ones") for i in range(9)}
+    found |= {
+        f"flux_{i}": ("", "of the windings' torque over the rotor's angle; 1, 0, 0 … of healthy ones") for i in range(9)
+    }
     return {name: found.get(name, ("", "")) for name in PARAMETER_ROWS}
 
 

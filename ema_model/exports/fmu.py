@@ -145,7 +145,9 @@ def _description3(one: Exported) -> str:
             f'variability="{fixed}"{_unit(field)}{start} description={quoteattr(field.meaning)}/>'
         )
     outputs = [place for place, causality, _ in variables(one) if causality == "output"]
-    return _XML + f"""\
+    return (
+        _XML
+        + f"""\
 <fmiModelDescription fmiVersion="3.0" modelName={_name(one)} instantiationToken="{token(one)}"
     description={_about(one)} generationTool="emaviz">
   <CoSimulation modelIdentifier="{one.name}" canHandleVariableCommunicationStepSize="true"
@@ -161,6 +163,7 @@ def _description3(one: Exported) -> str:
   </ModelStructure>
 </fmiModelDescription>
 """
+    )
 
 
 def _description2(one: Exported, sources: Sequence[str]) -> str:
@@ -176,7 +179,9 @@ def _description2(one: Exported, sources: Sequence[str]) -> str:
     outputs = [number for number, (_, causality, _) in enumerate(variables(one), 1) if causality == "output"]
     unknowns = _joined([f'      <Unknown index="{number}"/>' for number in outputs])
     files = _joined([f'      <File name="{name}"/>' for name in sources])
-    return _XML + f"""\
+    return (
+        _XML
+        + f"""\
 <fmiModelDescription fmiVersion="2.0" modelName={_name(one)} guid="{token(one)}" description={_about(one)}
     generationTool="emaviz" variableNamingConvention="flat">
   <CoSimulation modelIdentifier="{one.name}" canHandleVariableCommunicationStepSize="true"
@@ -200,11 +205,14 @@ def _description2(one: Exported, sources: Sequence[str]) -> str:
   </ModelStructure>
 </fmiModelDescription>
 """
+    )
 
 
 def _build(one: Exported, sources: Sequence[str]) -> str:
     files = _joined([f'      <SourceFile name="{name}"/>' for name in sources])
-    return _XML + f"""\
+    return (
+        _XML
+        + f"""\
 <fmiBuildDescription fmiVersion="3.0">
   <BuildConfiguration modelIdentifier="{one.name}" description="C99, without fused sums: -ffp-contract=off">
     <SourceFileSet language="C99" compilerOptions="-ffp-contract=off">
@@ -213,6 +221,7 @@ def _build(one: Exported, sources: Sequence[str]) -> str:
   </BuildConfiguration>
 </fmiBuildDescription>
 """
+    )
 
 
 _XML = '<?xml version="1.0" encoding="UTF-8"?>\n'
@@ -297,7 +306,7 @@ class RunningFmu:
 
     def replay(self, state: Array, parameters: Array, run: tuple[Array, ...], period: int, step_s: float) -> Array:
         """As `c.CompiledC.replay`; the start is set as a user of the FMU sets it."""
-        fmu, start = self._instance(), dict(zip((field.name for field in self._one.states), state.tolist()))
+        fmu, start = self.instance(), dict(zip((field.name for field in self._one.states), state.tolist()))
         p = dict(zip((field.name for field in self._one.parameters), parameters.tolist()))
         initial = [start["theta"] * p["gear_ratio"], start["omega"], start["play"] - start["theta"], start["integral"]]
         given = [*initial, *parameters.tolist()]
@@ -336,7 +345,8 @@ class RunningFmu:
             found[sample] = total / period, *outputs[1:]
         return found
 
-    def _instance(self) -> Any:
+    def instance(self) -> Any:
+        """One of its own in fmpy, not yet initialized."""
         from fmpy.fmi2 import FMU2Slave
         from fmpy.fmi3 import FMU3Slave
 

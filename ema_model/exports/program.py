@@ -59,7 +59,8 @@ class Row:
 
 @dataclass(frozen=True)
 class Operation:
-    """operator: + − * / and the comparisons, "and", "or", "not", "neg", "abs", "max", "min", "floor", "sqrt", "pow"."""
+    """operator: + − * / and the comparisons, "and", "or", "not", "neg", "abs", "max", "min", "pow",
+    and what C's library and numpy call by one name, as "sqrt"."""
 
     operator: str
     operands: tuple[Expression, ...]
@@ -135,7 +136,7 @@ class Function:
 
     @property
     def own(self) -> tuple[str, ...]:
-        """"s" and "p", those that it takes, in this order."""
+        """ "s" and "p", those that it takes, in this order."""
         return tuple(one for one in ("s", "p") if one in self.reads)
 
 
@@ -204,10 +205,9 @@ _COMPARISONS = {ast.Lt: "<", ast.LtE: "<=", ast.Gt: ">", ast.GtE: ">=", ast.Eq: 
 _ARITHMETIC = {ast.Add: "+", ast.Sub: "-", ast.Mult: "*", ast.Div: "/"}
 _BOTH = {ast.BitAnd: "and", ast.BitOr: "or"}
 _OF_FLAGS = {*_COMPARISONS.values(), "and", "or", "not"}
-_CALLED: dict[Any, str] = {
-    abs: "abs", max: "max", min: "min", math.sqrt: "sqrt", math.pow: "pow", math.floor: "floor", np.floor: "floor",
-    np.sqrt: "sqrt", np.abs: "abs", math.fabs: "abs",
-}  # fmt: skip
+_CALLED: dict[Any, str] = {abs: "abs", max: "max", min: "min", math.pow: "pow", math.fabs: "abs", np.abs: "abs"}
+for _name in ("sqrt", "floor", "sin", "cos", "tan", "exp", "log", "tanh"):  # called so in C, numpy and torch alike
+    _CALLED |= {getattr(math, _name): _name, getattr(np, _name): _name}
 _LANE, _STATE, _PARAMETERS = "i", "s", "p"
 _MOST_FACTORS = 64  # of a whole power
 
@@ -235,7 +235,7 @@ class _Reader:
         return self.function(function, kinds)
 
     def function(self, function: Any, kinds: tuple[Any, ...]) -> Function:
-        """The function for arguments of these kinds: "number", "flag", "s", "p", "i", a whole number, a tuple's size."""
+        """The function for arguments of these kinds: "number", "flag", "s", "p", "i", whole numbers, tuples' sizes."""
         key = (_plain(function), kinds)
         if key not in self.known:
             if key[0] in self.reading:
@@ -542,8 +542,10 @@ class _OfFunction:
             else:
                 arguments.append(found)
                 kinds.append("flag" if self.is_flag(found) else "number")
-        plain = _plain(called)
-        if (passed := _passed_on(plain)) is not None and kinds[:1] in (["number"], ["flag"]) and passed:
+        plain = getattr(called, "py_func", called)
+        if not inspect.isfunction(plain):
+            raise self.wrong(node, "has no form in it")
+        if kinds[:1] in (["number"], ["flag"]) and _passed_on(plain):
             return arguments[0]
         function = self.reader.function(called, tuple(kinds))
         self.writes |= function.writes
@@ -579,10 +581,7 @@ class _OfFunction:
 
 def _plain(function: Any) -> Any:
     """The Python function of one that numba has compiled."""
-    plain = getattr(function, "py_func", function)
-    if not inspect.isfunction(plain):
-        raise InputError(f"{getattr(function, '__name__', function)}: is no function of the model; an export cannot use it")
-    return plain
+    return getattr(function, "py_func", function)
 
 
 def _tree(function: Callable[..., Any]) -> ast.FunctionDef:

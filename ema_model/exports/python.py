@@ -38,7 +38,22 @@ _WIDTH = 110
 _BINDING = {"or": 1, "and": 2, "==": 0, "!=": 0, "<": 0, "<=": 0, ">": 0, ">=": 0, "+": 5, "-": 5, "*": 6, "/": 6}
 _SPELT = {"or": "|", "and": "&"}
 _HIGHEST = 9
-_OWN = {"s", "p", "where", "larger", "smaller", "anywhere", "xp", "math", "Model", "State", "abs", "floor", "sqrt"}
+_OWN = {
+    "s",
+    "p",
+    "where",
+    "larger",
+    "smaller",
+    "anywhere",
+    "xp",
+    "math",
+    "Model",
+    "State",
+    "Parameters",
+    "numpy",
+    "abs",
+    "vars",
+}
 # What `advance` finds before it moves the rotor, which a simulator does itself.
 _OF_TORQUE = ("current", "active", "static", "dynamic", "dry", "resisting")
 
@@ -97,7 +112,7 @@ def _text(one: Expression, binding: int = 0) -> str:
             parts = [_text(operands[0], first), *(_text(inner, others) for inner in operands[1:])]
             text = f" {_SPELT.get(operator, operator)} ".join(parts)
         case Operation(operator=operator, operands=operands):
-            text = f"{operator}({', '.join(map(_text, operands))})"
+            text = f"{'' if operator == 'abs' else 'xp.'}{operator}({', '.join(map(_text, operands))})"
         case Choice(test=test, then=then, otherwise=otherwise):
             text = f"where({_text(test)}, {_text(then)}, {_text(otherwise)})"
         case Call(function=function, arguments=arguments):
@@ -187,16 +202,6 @@ def larger(a, b):
 def smaller(a, b):
     """The smaller of two."""
     return where(b < a, b, a)
-
-
-def floor(x):
-    """The whole number below."""
-    return xp.floor(x)
-
-
-def sqrt(x):
-    """The root."""
-    return xp.sqrt(x)
 
 
 def anywhere(test):

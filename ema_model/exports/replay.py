@@ -96,7 +96,9 @@ def proof_of(one: Exported, recordings: Sequence[Measurement], progress: Callabl
         shown = {name: values[0] for name, values in model.signals(place).items()}
         bad = [name for name, values in shown.items() if not np.all(np.isfinite(values))]
         if bad:
-            raise InputError(f"{quoted(window.name)}: the model diverges in {bad[0]}; compare it with its recordings first")
+            raise InputError(
+                f"{quoted(window.name)}: the model diverges in {bad[0]}; compare it with its recordings first"
+            )
         ours.append(shown)
     return Proof(one, model, tuple(ours), not recordings)
 
@@ -216,10 +218,9 @@ def _made_up(one: Exported) -> Measurement:
         return replace(_moving_chirp(actuator), name="chirp")
     seconds = np.arange(5001) * 1e-4
     swing = np.sin(2.0 * np.pi * (2.0 * seconds + 20.0 * seconds**2))
+    name, size = "duty", 0.5
     if one.takes_torque:
         friction = max(actuator.motor.static_friction_Nm, actuator.motor.dynamic_friction_Nm)
-        signals = {"motor_torque_Nm": (3.0 * friction + 1e-3) * swing}
-    else:
-        signals = {"duty": 0.5 * swing}
-    zero = np.zeros_like(seconds)
-    return Measurement({"time_s": seconds, "user_position_rad": zero, **signals}, name="torque to and fro")
+        name, size = "motor_torque_Nm", 3.0 * friction + 1e-3
+    signals: dict[str, Array] = {"time_s": seconds, "user_position_rad": 0.0 * seconds, name: size * swing}
+    return Measurement(signals, name="swing")

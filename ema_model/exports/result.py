@@ -57,11 +57,9 @@ class TargetProof:
             measured = [(one, weight) for one, weight in several if math.isfinite(one.rmse_ours)]
             if measured:
                 weights = [weight for _, weight in measured]
-                pooled = (
-                    float(np.sqrt(np.average([value**2 for value in values], weights=weights)))
-                    for values in ([one.rmse for one, _ in measured], [one.rmse_ours for one, _ in measured])
-                )
-                found[name] = SignalLoss(*pooled, max(one.difference for one, _ in several))
+                squares = [(one.rmse**2, one.rmse_ours**2) for one, _ in measured]
+                theirs, ours = np.sqrt(np.average(squares, axis=0, weights=weights)).tolist()
+                found[name] = SignalLoss(theirs, ours, max(one.difference for one, _ in several))
         return found
 
 
@@ -98,8 +96,12 @@ def document_of(result: Export) -> Document:
 def first_line(result: Export) -> str:
     """'Thesis EMA is exported to out: C, Python.'."""
     titles = all_of([proof.title for proof in result.targets])
-    on = "a run made for it" if result.simulated else all_of(list(result.names)) if len(result.names) < 4 else (
-        f"{len(result.names)} recordings"
+    on = (
+        "a run made for it"
+        if result.simulated
+        else all_of(list(result.names))
+        if len(result.names) < 4
+        else (f"{len(result.names)} recordings")
     )
     return f"{result.one.given.name} is exported to {result.folder} as {titles}, replayed on {on}."
 
@@ -111,8 +113,8 @@ def in_one_line(proof: TargetProof) -> str:
     spent = f"{took:.3g} ms" if took < 1e3 else f"{1e-3 * took:.3g} s"
     replayed = sum(loss.duration_s for loss in proof.recordings)
     return (
-        f"{proof.title} ({files}), {proof.checked_with}: it differs from the monitor model by {proof.difference:.2g} of "
-        f"a signal's greatest value at most, over {replayed:.3g} s; 1 s of motion takes {spent}."
+        f"{proof.title} ({files}), {proof.checked_with}: over {replayed:.3g} s it differs from the monitor model by "
+        f"{proof.difference:.2g} of a signal's greatest value at most; 1 s of motion takes {spent}."
     )
 
 
@@ -126,7 +128,7 @@ def errors(result: Export, proof: TargetProof) -> Table:
 
 
 def switches(proof: TargetProof) -> list[str]:
-    """'chirp: differs from 0.231 s on, where the motor comes to rest …'; of recordings that differ by more than 1e-9."""
+    """'chirp: rounding grows beyond 1e-09 from 0.2310 s on, where the motor comes to rest'; of each that does."""
     if proof.target not in ("c", "fmu", "python"):
         return []  # which are other models, and differ from the start
     found = []
@@ -140,7 +142,9 @@ def switches(proof: TargetProof) -> list[str]:
 
 def budget(proof: TargetProof) -> str:
     """'MuJoCo cannot hold load-dependent friction (12 %), the sampled drive (3 %).'."""
-    parts = [f"{one.what} ({100.0 * one.share:.2g} %)" if math.isfinite(one.share) else one.what for one in proof.cannot_hold]
+    parts = [
+        f"{one.what} ({100.0 * one.share:.2g} %)" if math.isfinite(one.share) else one.what for one in proof.cannot_hold
+    ]
     return f"{proof.title} cannot hold {', '.join(parts)}: by so much of our error it is further off for it."
 
 
@@ -159,7 +163,9 @@ def say_signals(names: Sequence[str], axes: Axes) -> str:
 class SignalLossJson(TypedDict):
     """One signal of an export over one recording."""
 
-    rmse: Annotated[float | None, Meta(description="of the export beside the recording; null where it was not measured")]
+    rmse: Annotated[
+        float | None, Meta(description="of the export beside the recording; null where it was not measured")
+    ]
     rmse_ours: Annotated[float | None, Meta(description="the same of the monitor model")]
     difference: Annotated[float, Meta(description="the most that both differ by, of the signal's greatest value")]
     begins_s: Annotated[float | None, Meta(description="s, from where on that is more than 1e-9; null: never")]

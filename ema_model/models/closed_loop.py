@@ -197,7 +197,7 @@ class ClosedLoop:
         faster_rad_s: ArrayLike = 0.0,
         effects: Effects | None = None,
     ) -> tuple[Actuator, Array, Array]:
-        """A window as kernels take it: the actuator as it was in it, its parameters and its state, (blocks, rows·LANES).
+        """A window as kernels take it: the actuator as it was in it, its parameters and state, (blocks, rows·LANES).
 
         The others as in `signals`.
         """

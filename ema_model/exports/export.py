@@ -11,15 +11,15 @@ from pathlib import Path
 
 from ema_model.actuator import Actuator
 from ema_model.errors import InputError, did_you_mean, quoted
-from ema_model.exports import c, fmu, python
+from ema_model.exports import c, fmu, mjcf, python
 from ema_model.exports.exported import Exported, exported
-from ema_model.exports.replay import Proof, proof_of, replayed, shortened
+from ema_model.exports.replay import Proof, kernel_values, proof_of, replayed, shortened
 from ema_model.exports.result import Export, TargetProof
 from ema_model.recordings import Measurement
 
 Progress = Callable[[str], None]
 
-NAMES = ("c", "fmu", "python")  # of targets
+NAMES = ("c", "fmu", "mjcf", "python")  # of targets
 _MOST_PYTHON_STEPS = 20_000  # of a proof: each takes a fifth of a millisecond
 _MOST_FMU_STEPS = 500_000  # each takes ten microseconds
 
@@ -71,6 +71,23 @@ def _write_fmu(order: Order) -> TargetProof:
     return TargetProof("fmu", "FMU", (path.name,), checked, tuple(losses))
 
 
+def _write_mjcf(order: Order) -> TargetProof:
+    import mujoco  # takes a while, and need not be there
+
+    one, proof, progress = order.one, order.proof, order.progress
+    _, rows, _ = kernel_values(proof, proof.windows[0])
+    joint = mjcf.joint_of(one.actuator, {**rows, **one.rows})
+    cannot = mjcf.losses(shortened(proof, _MOST_FMU_STEPS), progress)
+    joint, factors = mjcf.fitted(proof, joint, progress)
+    notes = mjcf.in_words(joint, factors)
+    path = order.folder / f"{one.name}.xml"
+    path.write_text(mjcf.document(one, joint, notes), encoding="utf-8")
+    found = mjcf.replayed_in_mujoco(shortened(proof, _MOST_FMU_STEPS), factors, progress)
+    return TargetProof(
+        "mjcf", "MJCF", (path.name,), f"run in MuJoCo {mujoco.__version__}", tuple(found), tuple(cannot), tuple(notes)
+    )
+
+
 def _write_python(order: Order) -> TargetProof:
     name = f"{order.one.name}.py"
     (order.folder / name).write_text(python.source(order.one), encoding="utf-8")
@@ -82,6 +99,7 @@ def _write_python(order: Order) -> TargetProof:
 TARGETS = {
     "c": Target("C", c.compiler, _write_c),
     "fmu": Target("FMU", fmu.check, _write_fmu),
+    "mjcf": Target("MJCF", mjcf.check, _write_mjcf),
     "python": Target("Python", lambda: None, _write_python),
 }
 

@@ -46,6 +46,7 @@ class Exported:
     parameters: tuple[Field, ...]  # those that the program reads, in its order, then the rotor's offset
     states: tuple[Field, ...]  # at rest at 0
     command: Field  # what is put in
+    rows: dict[str, float]  # of the kernels' parameters, all of them, by name
     notes: tuple[str, ...]  # what whoever takes it must know, in sentences
 
     @property
@@ -120,6 +121,7 @@ def exported(actuator: Actuator, name: str = "") -> Exported:
         (*parameters, offset),
         tuple(Field(field_name(one), 0.0, *meanings[one]) for one in (*STATE_ROWS, *stack.states)),
         _command(taken),
+        {name: float(value) for name, value in rows.items()},
         tuple(notes),
     )
 

@@ -137,16 +137,22 @@ def replayed(proof: Proof, export: Replay, progress: Callable[[str], None]) -> l
         began = time.perf_counter()
         shown = _shown(proof, export, window)
         elapsed = time.perf_counter() - began
-        found.append(_loss(proof.one, window, ours, shown, elapsed))
+        found.append(loss_of(proof.one, window, ours, shown, elapsed))
     return found
+
+
+def kernel_values(proof: Proof, window: LoopWindow) -> tuple[Actuator, dict[str, float], dict[str, float]]:
+    """The actuator as it was in a window; its kernels' parameters and its state at the start, by name."""
+    actuator, rows, states = proof.model.begun(window)
+    stack = proof.model.stack
+    parameters = dict(zip(stack.parameter_rows, rows[0].reshape(-1, LANES)[:, 0].tolist()))
+    return actuator, parameters, dict(zip((*STATE_ROWS, *stack.states), states[0].reshape(-1, LANES)[:, 0].tolist()))
 
 
 def _shown(proof: Proof, export: Replay, window: LoopWindow) -> dict[str, Array]:
     """What the export shows of a window, as the sensors show it."""
     one, model = proof.one, proof.model
-    actuator, rows, states = model.begun(window)
-    values = dict(zip(model.stack.parameter_rows, rows[0].reshape(-1, LANES)[:, 0]))
-    at_start = dict(zip((*STATE_ROWS, *model.stack.states), states[0].reshape(-1, LANES)[:, 0]))
+    actuator, values, at_start = kernel_values(proof, window)
     known = {field_name(name): value for name, value in at_start.items()}
     state = np.array([known[field.name] for field in one.states])
     put_in = window.command
@@ -158,9 +164,10 @@ def _shown(proof: Proof, export: Replay, window: LoopWindow) -> dict[str, Array]
     return {name: of[0] for name, of in model.sensed(signals, actuator, window.block_s).items()}
 
 
-def _loss(
+def loss_of(
     one: Exported, window: LoopWindow, ours: dict[str, Array], shown: dict[str, Array], elapsed_s: float
 ) -> RecordingLoss:
+    """How far an export that showed this is from the monitor model and from what was measured."""
     signals, first, where = {}, math.inf, ""
     for name in COMPARED:
         away = np.abs(shown[name] - ours[name])

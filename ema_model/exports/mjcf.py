@@ -1,0 +1,503 @@
+"""The exported model as MJCF: a joint with armature, damping and dry friction, and MuJoCo's motor that drives it.
+
+Everything stands at the joint, which is the user's side: an inertia J of the motor is J/τ² there, a torque T/τ, a
+motor constant k_t/τ.  MuJoCo's `dcmotor` has the circuit R i = V − k ω, a torque limit, a PID loop in torque space whose
+voltage is limited, one cogging harmonic and LuGre friction.  What it cannot hold is left out and told, and the joint's
+values are fitted by replay in MuJoCo, so that the rest makes up for it as well as it can.
+"""
+
+from __future__ import annotations
+
+import importlib.util
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+from xml.sax.saxutils import quoteattr
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ema_model.actuator import Actuator
+from ema_model.effects import catalogue_name, find
+from ema_model.errors import InputError, quoted
+from ema_model.exports.exported import Exported
+from ema_model.exports.replay import Proof, RecordingLoss, kernel_values, loss_of, shortened
+from ema_model.exports.result import CannotHold
+from ema_model.models.loop_window import COMPARED
+from ema_model.quantities.sides import USER
+
+Array = NDArray[np.float64]
+
+HELD = {  # effects that have a form in MJCF
+    "cogging_torque": "the dcmotor's cogging",
+    "constant_load": "the joint's spring",
+    "demagnetisation": "the motor constant",
+    "goal_delay": "the actuator's delay",
+    "hinge_moment": "the joint's spring",
+    "inertia_error": "the armature",
+    "pendulum_load": "a mass on an arm",
+    "presliding_friction": "the dcmotor's LuGre friction",
+    "speed_loop_gain": "the controller's gains",
+    "stribeck_friction": "the dcmotor's LuGre friction",
+    "viscous_friction": "the joint's damping",
+    "winding_resistance": "the dcmotor's resistance",
+}
+_GRAVITY = 9.81
+_LIGHT = 1e-6  # of the inertia: the body's own, which MuJoCo must have
+_SLIDES = 0.5  # the same of one that slides, whose dry friction MuJoCo weighs by the mass alone
+_ARM = 0.01  # of the inertia, that a pendulum's mass makes at most
+_SOFT = 1e-6  # of a constant load, that a spring changes by in 1 rad
+_STIFF = 2.0  # steps in which dry friction takes hold; MuJoCo's own 20 ms let a joint creep
+_BRISTLES = 0.05  # rad in a step, of the fastest that bristles swing
+
+
+def check() -> None:
+    """InputError where MuJoCo is not installed."""
+    if importlib.util.find_spec("mujoco") is None:
+        raise InputError("MuJoCo is not installed, which replays the MJCF: pip install 'emaviz[export]'")
+
+
+# --- the joint --------------------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Joint:
+    """What MuJoCo holds of an actuator, all at the user: rad and N·m, or m and N of a linear axis."""
+
+    armature: float
+    damping: float
+    frictionloss: float
+    low: float
+    high: float
+    stiffness: float = 0.0
+    springref: float = 0.0
+    moment: float = 0.0  # m g l of a pendulum
+    hangs_at: float = 0.0  # rad
+    motorconst: float = 1.0  # N·m/A
+    resistance: float = 1.0  # Ω
+    torque_limit: float = math.inf
+    voltage: float = math.inf  # the most that the loop puts on
+    bus_voltage: float = 1.0  # what a duty is a share of
+    kp: float = 0.0
+    ki: float = 0.0
+    kd: float = 0.0
+    ki_of_speed: float = 0.0  # of ∫ω dt, that the loop takes off
+    begins_at: float = 0.0  # where that is 0
+    is_duty: bool = False  # whether the loop puts on a share of the bus, and compensates no back-EMF
+    lugre: tuple[float, float, float, float, float] | None = None
+    cogging: tuple[float, float, float] | None = None
+    delay_s: float = 0.0
+
+
+def joint_of(actuator: Actuator, rows: Mapping[str, float]) -> Joint:
+    """The joint of an actuator whose kernels' parameters are these, by name."""
+    tau = rows["gear_ratio"]
+    effects = {catalogue_name(name): given for name, given in actuator.effects.items()}
+
+    def of(effect: str, name: str, default: float = 0.0) -> float:
+        return float(effects[effect][name]) if effect in effects else default
+
+    inertia = (1.0 + of("inertia_error", "ratio")) / rows["inverse_inertia"]
+    constant = rows["torque_constant"] * rows["flux_0"] * (1.0 - of("demagnetisation", "ratio"))
+    resistance = rows["resistance"] * (1.0 + of("winding_resistance", "ratio"))
+    stiffness = of("hinge_moment", "stiffness_Nm_rad")
+    steady = of("hinge_moment", "offset_Nm") + of("constant_load", "torque_Nm")
+    if stiffness == 0.0 and steady != 0.0:
+        stiffness = _SOFT * abs(steady)
+    dynamic, static = rows["dynamic_friction"], max(rows["static_friction"], rows["dynamic_friction"])
+    lugre = _lugre(actuator, effects, dynamic, static, inertia, tau)
+    cogging = None
+    if "cogging_torque" in effects:
+        order, phase = (of("cogging_torque", name) for name in ("order", "phase_rad"))
+        # a torque in phase with the user's angle: θ = q/τ
+        cogging = (of("cogging_torque", "amplitude_Nm") / tau, order / tau, phase)
+    joint = Joint(
+        armature=inertia / tau**2,
+        damping=(rows["viscous"] + of("viscous_friction", "coefficient_Nms_rad")) / tau**2,
+        frictionloss=0.0 if lugre else dynamic / tau,
+        low=rows["stop_low"] * tau,
+        high=rows["stop_high"] * tau,
+        stiffness=stiffness,
+        springref=-steady / stiffness if stiffness else 0.0,
+        moment=of("pendulum_load", "moment_Nm"),
+        hangs_at=of("pendulum_load", "angle_rad"),
+        motorconst=constant / tau,
+        resistance=resistance,
+        torque_limit=min(rows["torque_limit"], constant * rows["output_limit"] if _has_current(actuator) else math.inf)
+        / tau,
+        lugre=lugre,
+        cogging=cogging,
+        delay_s=of("goal_delay", "delay_s"),
+        bus_voltage=rows["bus_voltage"],
+    )
+    return _with_loop(joint, actuator, rows, constant, resistance, of)
+
+
+def _has_current(actuator: Actuator) -> bool:
+    """Whether the controller's output is a current."""
+    return actuator.controller.kind != "open" and actuator.circuit() != "voltage"
+
+
+def _with_loop(
+    joint: Joint,
+    actuator: Actuator,
+    rows: Mapping[str, float],
+    constant: float,
+    resistance: float,
+    of: Callable[..., float],
+) -> Joint:
+    """The joint with its controller's gains, in torque."""
+    tau, most = rows["gear_ratio"], rows["voltage_ratio"] * rows["bus_voltage"]
+    match actuator.controller.kind, actuator.circuit():
+        case "position", "voltage":
+            kp = joint.motorconst / resistance * rows["bus_voltage"] * rows["position_gain"]
+            return replace(joint, kp=kp, is_duty=True, voltage=most * rows["output_limit"])
+        case "position", _:
+            return replace(joint, kp=constant * rows["output_limit"] * rows["position_gain"] / tau, voltage=math.inf)
+        case "cascade", drive:
+            gain = rows["speed_gain"] * (1.0 + of("speed_loop_gain", "ratio"))
+            scale = constant * rows["current_per_torque"]
+            integral = rows["integral_gain"]
+            # K_I ∫(G e − ω) dt is an integral of e, less K_I (θ − θ_0)
+            return replace(
+                joint,
+                ki_of_speed=scale * integral / tau**2,
+                kp=scale * gain * rows["position_gain"] / tau,
+                ki=scale * integral * rows["position_gain"] / tau,
+                kd=scale * gain / tau**2,
+                voltage=math.inf if drive == "current" else most,
+            )
+    return joint
+
+
+def _lugre(
+    actuator: Actuator, effects: Mapping[str, Any], dynamic: float, static: float, inertia: float, tau: float
+) -> tuple[float, float, float, float, float] | None:
+    """LuGre friction's five values, where bristles or Stribeck's law ask for them."""
+    speed, breakaway = 1.0, static
+    if "stribeck_friction" in effects:
+        speed = effects["stribeck_friction"]["speed_rad_s"]
+        breakaway = max(static, effects["stribeck_friction"]["breakaway_ratio"] * dynamic)
+    elif "presliding_friction" not in effects:
+        return None
+    stiffness = inertia * (_BRISTLES / actuator.step_s) ** 2
+    damping = 2.0 * math.sqrt(stiffness * inertia)
+    if "presliding_friction" in effects:
+        stiffness = effects["presliding_friction"]["stiffness_Nm_rad"]
+        damping = effects["presliding_friction"]["damping_Nms_rad"]
+    return stiffness / tau**2, damping / tau**2, dynamic / tau, breakaway / tau, speed * tau
+
+
+# --- the file ---------------------------------------------------------------------------------------------------------
+
+
+def document(one: Exported, joint: Joint, notes: Sequence[str] = ()) -> str:
+    """NAME.xml."""
+    linear = one.actuator.axes.is_linear(USER)
+    about = [f"{one.given.name}: {one.given.description}".rstrip(": "), *one.notes, *notes]
+    arm = min(0.1, _ARM * joint.armature * _GRAVITY / abs(joint.moment)) if joint.moment else 0.0
+    mass = abs(joint.moment) / (_GRAVITY * arm) if joint.moment else (_SLIDES if linear else _LIGHT) * joint.armature
+    light = _LIGHT * joint.armature
+    armature = joint.armature - (mass if linear else mass * arm**2 + light)
+    angle = joint.hangs_at + (0.0 if joint.moment >= 0.0 else math.pi)
+    # two actuators make the torque of a loop with an integral of the speed: both together are limited
+    summed = bool(joint.ki_of_speed) and _is_limited(joint)
+    most = f' actuatorfrcrange="{_n(-joint.torque_limit)} {_n(joint.torque_limit)}"' if summed else ""
+    limits = f' range="{_n(joint.low)} {_n(joint.high)}"' if abs(joint.low) < 1e3 or abs(joint.high) < 1e3 else ""
+    spring = f' stiffness="{_n(joint.stiffness)}" springref="{_n(joint.springref)}"' if joint.stiffness else ""
+    kind, axis = ("slide", "1 0 0") if linear else ("hinge", "0 1 0")
+    sensors = [
+        f'    <jointpos name="{one.name}_position" joint="{one.name}"/>',
+        f'    <jointvel name="{one.name}_speed" joint="{one.name}"/>',
+        f'    <jointactuatorfrc name="{one.name}_torque" joint="{one.name}"/>'
+        if joint.ki_of_speed
+        else f'    <actuatorfrc name="{one.name}_torque" actuator="{one.name}"/>',
+    ]
+    return f"""\
+<mujoco model={quoteattr(quoted(one.given.name, 100))}>
+  <!-- {_comment(about)}
+
+       Exported by emaviz, all at the joint.  ctrl: {_comment([_control(one)])}.  The motor's own current is the
+       actuator's force over motorconst. -->
+  <compiler angle="radian" autolimits="true"/>
+  <option timestep="{_n(one.step_s)}" integrator="implicitfast" gravity="0 0 -{_GRAVITY}"/>
+  <worldbody>
+    <body name="{one.name}">
+      <joint name="{one.name}" type="{kind}" axis="{axis}" armature="{_n(armature)}" damping="{_n(joint.damping)}"
+             frictionloss="{_n(joint.frictionloss)}" solreffriction="{_n(_STIFF * one.step_s)} 1"{spring}{limits}{most}/>
+      <inertial pos="{_n(arm * math.sin(angle))} 0 {_n(-arm * math.cos(angle))}" mass="{_n(mass)}"
+                diaginertia="{_n(light)} {_n(light)} {_n(light)}"/>
+    </body>
+  </worldbody>
+  <actuator>
+{_motor(one, joint)}
+  </actuator>
+  <sensor>
+{chr(10).join(sensors)}
+  </sensor>
+</mujoco>
+"""
+
+
+def _motor(one: Exported, joint: Joint) -> str:
+    named = f'name="{one.name}" joint="{one.name}"'
+    late = ""
+    if joint.delay_s > 0.0:
+        late = f' delay="{_n(joint.delay_s)}" nsample="{math.ceil(joint.delay_s / one.step_s) + 2}" interp="linear"'
+    limited = _is_limited(joint) and not joint.ki_of_speed
+    circuit = f'motorconst="{_n(joint.motorconst)}" resistance="{_n(joint.resistance)}"'
+    saturation = f' saturation="{_n(joint.torque_limit)}"' if limited else ""
+    if one.takes_torque:
+        force = f' forcerange="{_n(-joint.torque_limit)} {_n(joint.torque_limit)}"' if limited else ""
+        lines = [f"    <motor {named}{late}{force}/>"]
+    elif one.actuator.takes_voltage:
+        lines = [f"    <dcmotor {named} {circuit}{saturation}{late}/>"]
+    else:
+        # MuJoCo's loop compensates the back-EMF, and this kd takes that away where v = V g e
+        kd = joint.motorconst**2 / joint.resistance if joint.is_duty else joint.kd
+        most = f" {_n(joint.voltage)}" if math.isfinite(joint.voltage) else " 0"
+        loop = f'input="pos" controller="{_n(joint.kp)} {_n(joint.ki)} {_n(kd)} 0 0{most}"'
+        lines = [f"    <dcmotor {named} {circuit}{saturation}\n             {loop}{late}/>"]
+    if joint.ki_of_speed:
+        bias = f"{_n(joint.ki_of_speed * joint.begins_at)} {_n(-joint.ki_of_speed)} 0"
+        lines.append(f'    <general name="{one.name}_speed_integral" joint="{one.name}" gainprm="0" biastype="affine"')
+        lines.append(f'             biasprm="{bias}"/>')
+    passive = ""
+    if joint.cogging:
+        passive += f' cogging="{" ".join(map(_n, joint.cogging))}"'
+    if joint.lugre:
+        passive += f' lugre="{" ".join(map(_n, joint.lugre))}"'
+    if passive:
+        lines.append(f'    <dcmotor joint="{one.name}" input="none" motorconst="0" resistance="1"{passive}/>')
+    return "\n".join(lines)
+
+
+def _is_limited(joint: Joint) -> bool:
+    return joint.torque_limit < 1e8
+
+
+def _control(one: Exported) -> str:
+    if one.takes_torque:
+        return "the motor's torque at the joint"
+    return "the motor's voltage, V" if one.actuator.takes_voltage else f"{one.command.meaning}, {one.command.unit}"
+
+
+def _n(value: float) -> str:
+    return f"{float(value):.10g}"
+
+
+def _comment(lines: Sequence[str]) -> str:
+    return "\n       ".join(quoted(line).replace("--", "− −") for line in lines)
+
+
+# --- run --------------------------------------------------------------------------------------------------------------
+
+_MOST_STEPS = 60_000  # of one replay while values are fitted
+_EVALUATIONS = 40
+_FARTHEST = math.log(20.0)  # that a value may go from its own
+_FITTED = ("armature", "damping", "frictionloss", "kp", "motorconst")
+_PULL = 0.02  # toward the model's own values, where the recordings tell nothing of them
+_CHANGED = 0.005  # of a value, from which on its fit is told
+
+
+def run(one: Exported, joint: Joint, proof: Proof, place: int) -> dict[str, Array]:
+    """The four signals of a window in MuJoCo, (samples,) each, as the sensors show them."""
+    import mujoco
+    from mujoco import rollout
+
+    window = proof.windows[place]
+    actuator, values, state = kernel_values(proof, window)
+    tau, constant = values["gear_ratio"], joint.motorconst
+    angle = state["theta"] * tau
+    joint = replace(joint, begins_at=angle)
+    text = document(replace_step(one, window.step_s), joint)
+    try:
+        model = mujoco.MjModel.from_xml_string(text)
+    except ValueError as error:
+        raise InputError(f"MuJoCo refuses the MJCF: {quoted(error, 200)}") from None
+    data = mujoco.MjData(model)
+    data.qpos[0], data.qvel[0] = angle, state["omega"] * tau
+    if joint.ki > 0.0:
+        data.act[0] = state["integral"] * values["torque_constant"] * values["current_per_torque"] / tau / joint.ki
+    put_in = window.command
+    if one.takes_torque:
+        put_in = put_in * values["torque_constant"] / tau
+    elif one.actuator.takes_voltage:
+        put_in = put_in * values["bus_voltage"] * window.supply
+    spec = int(mujoco.mjtState.mjSTATE_FULLPHYSICS)
+    start = np.empty(mujoco.mj_stateSize(model, spec))
+    mujoco.mj_getState(model, data, start, spec)
+    kinds = mujoco.mjtState.mjSTATE_CTRL | mujoco.mjtState.mjSTATE_QFRC_APPLIED
+    control = np.column_stack([put_in, *[0.0 * put_in] * (model.nu - 1), -window.load])
+    with np.errstate(all="ignore"):
+        states, sensed = rollout.rollout(model, data, start[None], control[None], control_spec=int(kinds))
+    torque = sensed[0, :, 2]  # of two actuators, before it is limited
+    current = torque.reshape(-1, window.steps_per_sample).mean(axis=1) / constant
+    ends = slice(window.steps_per_sample - 1, None, window.steps_per_sample)
+    position, speed = states[0, ends, 1], states[0, ends, 2]
+    shown = dict(zip(COMPARED, (current, speed / tau, position / tau, position)))
+    signals = {name: np.ascontiguousarray(shown[name][None]) for name in COMPARED}
+    return {name: of[0] for name, of in proof.model.sensed(signals, actuator, window.block_s).items()}
+
+
+def replace_step(one: Exported, step_s: float) -> Exported:
+    """The same at another step."""
+    return replace(one, actuator=replace(one.actuator, step_s=step_s))
+
+
+def joints_of(proof: Proof) -> list[Joint]:
+    """The joint of each window, which may have values of its own."""
+    found = []
+    for window in proof.windows:
+        actuator, values, _ = kernel_values(proof, window)
+        found.append(joint_of(actuator, values))
+    return found
+
+
+def fitted(proof: Proof, joint: Joint, progress: Callable[[str], None]) -> tuple[Joint, dict[str, float]]:
+    """The joint with values by which MuJoCo comes nearest to the recordings; and by which factor each has changed.
+
+    A value of each window's own changes by the same factor.  Without recordings it comes nearest to the monitor model.
+    """
+    from scipy.optimize import least_squares  # takes a third of a second to import
+
+    short = shortened(proof, _MOST_STEPS)
+    names = [
+        name for name in _FITTED if getattr(joint, name) > 0.0 and not (name == "motorconst" and proof.one.takes_torque)
+    ]
+    sizes = [_sizes(short, place) for place in range(len(short.windows))]
+    joints = joints_of(short)
+    count = 0
+
+    def away(logs: Array) -> Array:
+        nonlocal count
+        count += 1
+        progress(f"fitting MuJoCo's joint ({count} of about {_EVALUATIONS})")
+        parts = []
+        for place, own in enumerate(joints):
+            changed = scaled(own, dict(zip(names, np.exp(logs))))
+            shown = run(proof.one, changed, short, place)
+            for name, (aim, size) in sizes[place].items():
+                error = np.nan_to_num((shown[name] - aim) / size, nan=1e6, posinf=1e6, neginf=-1e6)
+                parts.append(np.clip(error, -1e6, 1e6) / math.sqrt(error.size))
+        return np.concatenate([*parts, _PULL * logs])
+
+    found = least_squares(
+        away,
+        np.zeros(len(names)),
+        bounds=(-_FARTHEST, _FARTHEST),
+        diff_step=1e-3,
+        max_nfev=max(2, _EVALUATIONS // (len(names) + 1)),
+        loss="linear",
+    )
+    factors = dict(zip(names, np.exp(found.x).tolist()))
+    return scaled(joint, factors), factors
+
+
+def scaled(joint: Joint, factors: Mapping[str, float]) -> Joint:
+    """The joint with values times these factors."""
+    return replace(joint, **{name: getattr(joint, name) * factor for name, factor in factors.items()})
+
+
+def _sizes(proof: Proof, place: int) -> dict[str, tuple[Array, float]]:
+    """Of a window, what each signal is to come near to, and what its error is counted by."""
+    window, ours = proof.windows[place], proof.ours[place]
+    found = {}
+    for name, shown in ours.items():
+        aim = shown if proof.simulated else window.measured.get(name)
+        if aim is None:
+            continue
+        spread = float(np.std(aim))
+        size = 0.01 * spread if proof.simulated else max(float(np.sqrt(np.mean((shown - aim) ** 2))), 1e-3 * spread)
+        if size > 0.0:
+            found[name] = (aim, size)
+    return found
+
+
+def replayed_in_mujoco(
+    proof: Proof, factors: Mapping[str, float], progress: Callable[[str], None]
+) -> list[RecordingLoss]:
+    """MuJoCo over every window."""
+    import time
+
+    found = []
+    for place, (window, own) in enumerate(zip(proof.windows, joints_of(proof))):
+        progress(f"replaying {window.name or 'a run'} in MuJoCo ({place + 1} of {len(proof.windows)})")
+        began = time.perf_counter()
+        shown = run(proof.one, scaled(own, factors), proof, place)
+        elapsed = time.perf_counter() - began
+        found.append(loss_of(proof.one, window, proof.ours[place], shown, elapsed))
+    return found
+
+
+def in_words(joint: Joint, factors: Mapping[str, float]) -> list[str]:
+    """'Fitted by replay: frictionloss 0.0312, 1.08 times the model's.'; of values that have changed."""
+    parts = [
+        f"{name} {getattr(joint, name):.4g}, {factor:.3g} times the model's"
+        for name, factor in factors.items()
+        if abs(factor - 1.0) > _CHANGED
+    ]
+    return [f"Fitted by replay in MuJoCo: {'; '.join(parts)}."] if parts else []
+
+
+# --- what MuJoCo cannot hold ------------------------------------------------------------------------------------------
+
+
+def losses(proof: Proof, progress: Callable[[str], None]) -> list[CannotHold]:
+    """Each part of the model that MuJoCo has no form for, the greatest first.
+
+    share: by how much of itself our own error grows without it; without recordings, how far the model without it is
+    from the model, of the signals' size.
+    """
+    actuator = proof.one.actuator
+    left_out: list[tuple[str, dict[str, float], bool]] = []  # what, values without it, whether the supply is even
+    seen: set[str] = set()
+    for name in actuator.effects:
+        kind = catalogue_name(name)
+        if kind in HELD and kind not in seen:
+            seen.add(kind)  # a second one of the kind has no place
+            continue
+        effect = find(name, actuator.axes)
+        first = effect.parameters[0].name
+        left_out.append((effect.title.lower(), {f"effects.{name}.{first}": effect.nothing}, False))
+    motor, controller, transmission = actuator.motor, actuator.controller, actuator.transmission
+    if transmission.backlash_rad > 0.0:
+        left_out.append(("backlash", {"transmission.backlash_rad": 0.0}, False))
+    has_lugre = bool({"stribeck_friction", "presliding_friction"} & set(map(catalogue_name, actuator.effects)))
+    if motor.static_friction_Nm > motor.dynamic_friction_Nm and not has_lugre:
+        equal = {"motor.static_friction_Nm": motor.dynamic_friction_Nm}
+        left_out.append(("more friction at rest than in motion", equal, False))
+    if controller.kind == "cascade":
+        left_out.append(("the speed limit of the position loop", {"controller.speed_limit_rad_s": 1e9}, False))
+        if controller.derivative_gain_Nms2_rad > 0.0:
+            left_out.append(("the derivative action", {"controller.derivative_gain_Nms2_rad": 0.0}, False))
+    if any(np.ptp(window.supply) > 0.0 or window.supply[0] != 1.0 for window in proof.windows):
+        if not actuator.takes_voltage:
+            left_out.append(("a supply that changes", {}, True))
+    found = []
+    for what, values, even in left_out:
+        progress(f"the model without {what}")
+        share = _share(proof, actuator.varied(values), even)
+        if not math.isfinite(share) or share >= _LEAST:
+            found.append(CannotHold(what, share))
+    return sorted(found, key=lambda one: -one.share if math.isfinite(one.share) else 0.0)
+
+
+_LEAST = 5e-4  # of our error, from which on it is told
+
+
+def _share(proof: Proof, without: Actuator, even: bool) -> float:
+    squares, counts = 0.0, 0
+    for place, ours in enumerate(proof.ours):
+        shown = proof.model.signals(place, actuator=without, even=even)
+        for name, (aim, size) in _sizes(proof, place).items():
+            if proof.simulated:
+                size = float(np.std(ours[name]))
+            error = np.nan_to_num(shown[name][0] - aim, nan=1e6)
+            squares += float(np.mean((error / size) ** 2))
+            counts += 1
+    if counts == 0:
+        return math.nan
+    rms = math.sqrt(squares / counts)
+    return rms if proof.simulated else rms - 1.0

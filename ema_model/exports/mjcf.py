@@ -1,16 +1,20 @@
 """The exported model as MJCF: a joint with armature, damping and dry friction, and MuJoCo's motor that drives it.
 
 Everything stands at the joint, which is the user's side: an inertia J of the motor is J/τ² there, a torque T/τ, a
-motor constant k_t/τ.  MuJoCo's `dcmotor` has the circuit R i = V − k ω, a torque limit, a PID loop in torque space whose
+motor constant k_t/τ.  MuJoCo's `dcmotor` has the circuit R i = V − k ω, a torque limit, a PID loop in torque whose
 voltage is limited, one cogging harmonic and LuGre friction.  What it cannot hold is left out and told, and the joint's
 values are fitted by replay in MuJoCo, so that the rest makes up for it as well as it can.
 """
 
 from __future__ import annotations
 
+import importlib
 import importlib.util
+import itertools
 import math
+import re
 from collections.abc import Callable, Mapping, Sequence
+from copy import copy
 from dataclasses import dataclass, replace
 from typing import Any
 from xml.sax.saxutils import quoteattr
@@ -24,7 +28,7 @@ from ema_model.errors import InputError, quoted
 from ema_model.exports.exported import Exported
 from ema_model.exports.replay import Proof, RecordingLoss, kernel_values, loss_of, shortened
 from ema_model.exports.result import CannotHold
-from ema_model.models.loop_window import COMPARED
+from ema_model.models.loop_window import COMPARED, LoopWindow
 from ema_model.quantities.sides import USER
 
 Array = NDArray[np.float64]
@@ -194,6 +198,7 @@ def _lugre(
 
 def document(one: Exported, joint: Joint, notes: Sequence[str] = ()) -> str:
     """NAME.xml."""
+    stiff = _n(_STIFF * one.step_s)
     linear = one.actuator.axes.is_linear(USER)
     about = [f"{one.given.name}: {one.given.description}".rstrip(": "), *one.notes, *notes]
     arm = min(0.1, _ARM * joint.armature * _GRAVITY / abs(joint.moment)) if joint.moment else 0.0
@@ -225,7 +230,7 @@ def document(one: Exported, joint: Joint, notes: Sequence[str] = ()) -> str:
   <worldbody>
     <body name="{one.name}">
       <joint name="{one.name}" type="{kind}" axis="{axis}" armature="{_n(armature)}" damping="{_n(joint.damping)}"
-             frictionloss="{_n(joint.frictionloss)}" solreffriction="{_n(_STIFF * one.step_s)} 1"{spring}{limits}{most}/>
+             frictionloss="{_n(joint.frictionloss)}" solreffriction="{stiff} 1"{spring}{limits}{most}/>
       <inertial pos="{_n(arm * math.sin(angle))} 0 {_n(-arm * math.cos(angle))}" mass="{_n(mass)}"
                 diaginertia="{_n(light)} {_n(light)} {_n(light)}"/>
     </body>
@@ -302,46 +307,67 @@ _CHANGED = 0.005  # of a value, from which on its fit is told
 
 
 def run(one: Exported, joint: Joint, proof: Proof, place: int) -> dict[str, Array]:
-    """The four signals of a window in MuJoCo, (samples,) each, as the sensors show them."""
-    import mujoco
-    from mujoco import rollout
+    """The four signals of a window in MuJoCo, (samples,) each, as the sensors show them.
 
+    A drive that is switched off meanwhile is a joint without its motor.
+    """
     window = proof.windows[place]
     actuator, values, state = kernel_values(proof, window)
-    tau, constant = values["gear_ratio"], joint.motorconst
-    angle = state["theta"] * tau
-    joint = replace(joint, begins_at=angle)
-    text = document(replace_step(one, window.step_s), joint)
-    try:
-        model = mujoco.MjModel.from_xml_string(text)
-    except ValueError as error:
-        raise InputError(f"MuJoCo refuses the MJCF: {quoted(error, 200)}") from None
-    data = mujoco.MjData(model)
-    data.qpos[0], data.qvel[0] = angle, state["omega"] * tau
-    if joint.ki > 0.0:
-        data.act[0] = state["integral"] * values["torque_constant"] * values["current_per_torque"] / tau / joint.ki
+    tau = values["gear_ratio"]
+    joint = replace(joint, begins_at=state["theta"] * tau)
     put_in = window.command
     if one.takes_torque:
         put_in = put_in * values["torque_constant"] / tau
     elif one.actuator.takes_voltage:
         put_in = put_in * values["bus_voltage"] * window.supply
-    spec = int(mujoco.mjtState.mjSTATE_FULLPHYSICS)
-    start = np.empty(mujoco.mj_stateSize(model, spec))
-    mujoco.mj_getState(model, data, start, spec)
-    kinds = mujoco.mjtState.mjSTATE_CTRL | mujoco.mjtState.mjSTATE_QFRC_APPLIED
-    control = np.column_stack([put_in, *[0.0 * put_in] * (model.nu - 1), -window.load])
-    with np.errstate(all="ignore"):
-        states, sensed = rollout.rollout(model, data, start[None], control[None], control_spec=int(kinds))
-    torque = sensed[0, :, 2]  # of two actuators, before it is limited
-    current = torque.reshape(-1, window.steps_per_sample).mean(axis=1) / constant
-    ends = slice(window.steps_per_sample - 1, None, window.steps_per_sample)
-    position, speed = states[0, ends, 1], states[0, ends, 2]
+    text = document(_at_step(one, window.step_s), joint)
+    integral = 0.0
+    if joint.ki > 0.0:
+        integral = state["integral"] * values["torque_constant"] * values["current_per_torque"] / tau / joint.ki
+    at = (state["theta"] * tau, state["omega"] * tau)
+    is_on = window.supply > 0.0
+    switched = [0, *(np.flatnonzero(np.diff(is_on)) + 1), is_on.size]
+    parts = []
+    for first, last in itertools.pairwise(switched):
+        own = text if is_on[first] else _ACTUATORS.sub("", text)
+        part = _rolled_out(own, at, integral, put_in[first:last], window.load[first:last])
+        at, integral = tuple(part[-1, :2]), 0.0
+        parts.append(part)
+    moved = np.concatenate(parts)
+    current = moved[:, 2].reshape(-1, window.steps_per_sample).mean(axis=1) / joint.motorconst
+    position, speed = moved[window.steps_per_sample - 1 :: window.steps_per_sample, :2].T
     shown = dict(zip(COMPARED, (current, speed / tau, position / tau, position)))
     signals = {name: np.ascontiguousarray(shown[name][None]) for name in COMPARED}
     return {name: of[0] for name, of in proof.model.sensed(signals, actuator, window.block_s).items()}
 
 
-def replace_step(one: Exported, step_s: float) -> Exported:
+_ACTUATORS = re.compile(r"  <actuator>.*?</actuator>\n|    <(joint)?actuatorfrc .*?/>\n", re.DOTALL)
+
+
+def _rolled_out(text: str, at: Sequence[float], integral: float, put_in: Array, load: Array) -> Array:
+    """Position, speed and the motor's torque at the end of each step, (steps, 3)."""
+    mujoco: Any = importlib.import_module("mujoco")  # which states no types
+    rollout: Any = importlib.import_module("mujoco.rollout")
+    try:
+        model = mujoco.MjModel.from_xml_string(text)
+    except ValueError as error:
+        raise InputError(f"MuJoCo refuses the MJCF: {quoted(error, 200)}") from None
+    data = mujoco.MjData(model)
+    data.qpos[0], data.qvel[0] = at
+    if integral:
+        data.act[0] = integral
+    whole = mujoco.mjtState.mjSTATE_FULLPHYSICS
+    start = np.empty(mujoco.mj_stateSize(model, int(whole)))
+    mujoco.mj_getState(model, data, start, int(whole))
+    columns = [put_in, 0.0 * put_in][: model.nu]
+    control = np.column_stack([*columns, -load])
+    kinds = int(mujoco.mjtState.mjSTATE_CTRL | mujoco.mjtState.mjSTATE_QFRC_APPLIED)
+    states, sensed = rollout.rollout(model, data, start[None], control[None], control_spec=kinds)
+    torque = sensed[0, :, 2] if model.nsensor > 2 else 0.0 * load
+    return np.column_stack([states[0, :, 1:3], torque])
+
+
+def _at_step(one: Exported, step_s: float) -> Exported:
     """The same at another step."""
     return replace(one, actuator=replace(one.actuator, step_s=step_s))
 
@@ -351,8 +377,15 @@ def joints_of(proof: Proof) -> list[Joint]:
     found = []
     for window in proof.windows:
         actuator, values, _ = kernel_values(proof, window)
-        found.append(joint_of(actuator, values))
+        supply = float(_even(window).max())
+        found.append(joint_of(actuator, {**values, "bus_voltage": values["bus_voltage"] * supply}))
     return found
+
+
+def _even(window: LoopWindow) -> Array:
+    """The supply at its mean wherever the drive is on."""
+    is_on = window.supply > 0.0
+    return np.where(is_on, window.supply[is_on].mean() if np.any(is_on) else 1.0, 0.0)
 
 
 def fitted(proof: Proof, joint: Joint, progress: Callable[[str], None]) -> tuple[Joint, dict[str, float]]:
@@ -448,10 +481,10 @@ def losses(proof: Proof, progress: Callable[[str], None]) -> list[CannotHold]:
     """Each part of the model that MuJoCo has no form for, the greatest first.
 
     share: by how much of itself our own error grows without it; without recordings, how far the model without it is
-    from the model, of the signals' size.
+    from the whole model, of the signals' size.
     """
     actuator = proof.one.actuator
-    left_out: list[tuple[str, dict[str, float], bool]] = []  # what, values without it, whether the supply is even
+    left_out: list[tuple[str, dict[str, float], bool]] = []  # what, the values without it, whether the supply is even
     seen: set[str] = set()
     for name in actuator.effects:
         kind = catalogue_name(name)
@@ -472,9 +505,8 @@ def losses(proof: Proof, progress: Callable[[str], None]) -> list[CannotHold]:
         left_out.append(("the speed limit of the position loop", {"controller.speed_limit_rad_s": 1e9}, False))
         if controller.derivative_gain_Nms2_rad > 0.0:
             left_out.append(("the derivative action", {"controller.derivative_gain_Nms2_rad": 0.0}, False))
-    if any(np.ptp(window.supply) > 0.0 or window.supply[0] != 1.0 for window in proof.windows):
-        if not actuator.takes_voltage:
-            left_out.append(("a supply that changes", {}, True))
+    if not actuator.takes_voltage and any(np.any(_even(one) != one.supply) for one in proof.windows):
+        left_out.append(("a supply that changes in a run", {}, True))
     found = []
     for what, values, even in left_out:
         progress(f"the model without {what}")
@@ -489,8 +521,11 @@ _LEAST = 5e-4  # of our error, from which on it is told
 
 def _share(proof: Proof, without: Actuator, even: bool) -> float:
     squares, counts = 0.0, 0
+    model = copy(proof.model)
+    if even:
+        model.windows = [replace(one, supply=_even(one)) for one in model.windows]
     for place, ours in enumerate(proof.ours):
-        shown = proof.model.signals(place, actuator=without, even=even)
+        shown = model.signals(place, actuator=without)
         for name, (aim, size) in _sizes(proof, place).items():
             if proof.simulated:
                 size = float(np.std(ours[name]))

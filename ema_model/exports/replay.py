@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable, Sequence
+from copy import copy
 from dataclasses import dataclass, field, replace
 from typing import Protocol
 
@@ -124,8 +125,8 @@ def shortened(proof: Proof, most_steps: int) -> Proof:
             )
         )
         ours.append({name: values[:blocks] for name, values in shown.items()})
-    model = ClosedLoop.__new__(ClosedLoop)
-    vars(model).update({**vars(proof.model), "windows": windows})
+    model = copy(proof.model)
+    model.windows = windows
     return replace(proof, model=model, ours=tuple(ours))
 
 
@@ -223,11 +224,10 @@ def _made_up(one: Exported) -> Measurement:
     actuator: Actuator = one.actuator
     if actuator.controller.kind != "open":
         return replace(_moving_chirp(actuator), name="chirp")
-    seconds = np.arange(5001) * 1e-4
+    seconds = np.linspace(0.0, 0.5, 5001)
     swing = np.sin(2.0 * np.pi * (2.0 * seconds + 20.0 * seconds**2))
     name, size = "duty", 0.5
     if one.takes_torque:
         friction = max(actuator.motor.static_friction_Nm, actuator.motor.dynamic_friction_Nm)
         name, size = "motor_torque_Nm", 3.0 * friction + 1e-3
-    signals: dict[str, Array] = {"time_s": seconds, "user_position_rad": 0.0 * seconds, name: size * swing}
-    return Measurement(signals, name="swing")
+    return Measurement({"time_s": seconds, "user_position_rad": 0.0 * seconds, name: size * swing}, name="swing")

@@ -26,6 +26,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """The kinds, the values that are known, effects, and how recordings are read."""
     kinds, axes = stated_in("ema_model.actuator.keys", "KINDS"), stated_in("ema_model.quantities.axes", "KINDS")
     parser.add_argument("file", type=options.SAVED_ACTUATOR, metavar="FILE.toml", help="the file to write")
+    parser.add_argument(
+        "--from",
+        dest="model",
+        metavar="MODEL.xml#JOINT",
+        help="what an MJCF model says of a joint and of the actuator that drives it; options add to it",
+    )
     parser.add_argument("--name", help="what the actuator is called; without it, the file's name")
     parser.add_argument("--description", default="", help="a sentence about it")
     parser.add_argument("--motor", choices=axes, help="whether the motor turns; rotary without it")
@@ -78,6 +84,9 @@ def run(arguments: argparse.Namespace) -> int:
     from emaviz.cli.verbs.actuator.questions import ask
 
     document = _document(arguments)
+    read: list[str] = []
+    if arguments.model is not None:
+        read = _from_model(document, arguments)
     if arguments.controller is None and sys.stdin.isatty():
         ask(document, arguments)
     controller, drive, notes = _kinds(arguments)
@@ -86,7 +95,7 @@ def run(arguments: argparse.Namespace) -> int:
     found: NewActuatorJson = {
         "file": arguments.file,
         "name": actuator.name,
-        "notes": notes,
+        "notes": [*read, *notes],
         "missing": list(missing(actuator)),
         "implausible": list(implausible(actuator)),
     }
@@ -95,6 +104,20 @@ def run(arguments: argparse.Namespace) -> int:
         print(f"! {line}")
     output.write_json(arguments, found)
     return 0
+
+
+def _from_model(document: dict[str, Any], arguments: argparse.Namespace) -> list[str]:
+    """Puts what an MJCF model says into the tables, where no option says otherwise; notes."""
+    from ema_model.exports.from_mjcf import joint_tables
+
+    tables, controller, drive, notes = joint_tables(arguments.model)
+    for section, table in tables.items():
+        document[section] = {**table, **document.get(section, {})} if section != "axes" else table
+    if arguments.controller is None:
+        arguments.controller, arguments.drive = controller, arguments.drive or drive
+    if arguments.drive == "current" and arguments.controller in ("open", "unknown"):
+        arguments.drive = None  # which have no other
+    return notes
 
 
 def _kinds(arguments: argparse.Namespace) -> tuple[str, str, list[str]]:

@@ -155,6 +155,19 @@ def export(
     return found
 
 
+def at_hand() -> tuple[list[str], list[str]]:
+    """The targets whose tools are there, and a line for each of the others."""
+    names, lines = [], []
+    for name, target in TARGETS.items():
+        try:
+            target.check()
+        except InputError as error:
+            lines.append(f"{target.title} is left out: {error}")
+        else:
+            names.append(name)
+    return names, lines
+
+
 def check_folder(out: str | os.PathLike[str]) -> Path:
     """The folder to write, which is not there yet or is empty; InputError for any other."""
     folder = Path(os.path.realpath(out))

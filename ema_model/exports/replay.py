@@ -51,14 +51,18 @@ class SignalLoss:
     begins_s: float = math.nan  # of the recording, where that is more than `EXACT`
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class RecordingLoss:
-    """An export over one recording."""
+    """An export over one recording; arrays are (samples,)."""
 
     name: str
     duration_s: float  # that was replayed
     elapsed_s: float  # that the export took
     signals: dict[str, SignalLoss]  # by name inside
+    time_s: Array = field(repr=False)
+    measured: dict[str, Array] = field(repr=False)  # where it was
+    ours: dict[str, Array] = field(repr=False)
+    shown: dict[str, Array] = field(repr=False)  # by the export
     switch: str = ""  # at what a difference begins, in words
 
 
@@ -183,7 +187,8 @@ def loss_of(
         signals[name] = SignalLoss(
             _rms(shown[name], measured), _rms(ours[name], measured), float(np.max(away)) / largest, begins
         )
-    return RecordingLoss(window.name, window.blocks * window.block_s, elapsed_s, signals, where)
+    arrays = window.time_s, window.measured, ours, shown
+    return RecordingLoss(window.name, window.blocks * window.block_s, elapsed_s, signals, *arrays, where)
 
 
 _MOVES = 0.2  # of a chirp's amplitude, from which on the user follows it

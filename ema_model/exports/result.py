@@ -87,7 +87,8 @@ def document_of(result: Export) -> Document:
     blocks = [Lines([first_line(result), *result.one.notes])]
     for proof in result.targets:
         blocks += [Lines([in_one_line(proof)]), *([] if result.simulated else [errors(result, proof)])]
-        blocks += [Note(line) for line in (*switches(proof), *proof.notes)]
+        blocks += [Lines([line]) for line in proof.notes]
+        blocks += [Note(line) for line in switches(proof)]
         if proof.cannot_hold:
             blocks.append(Note(budget(proof)))
     return Document(blocks)
@@ -141,11 +142,16 @@ def switches(proof: TargetProof) -> list[str]:
 
 
 def budget(proof: TargetProof) -> str:
-    """'MuJoCo cannot hold load-dependent friction (12 %), the sampled drive (3 %).'."""
+    """'MuJoCo cannot hold load-dependent friction (12 %), sampled control (3.1 %): …'."""
     parts = [
-        f"{one.what} ({100.0 * one.share:.2g} %)" if math.isfinite(one.share) else one.what for one in proof.cannot_hold
+        f"{one.what} ({_percent(one.share)})" if math.isfinite(one.share) else one.what for one in proof.cannot_hold
     ]
-    return f"{proof.title} cannot hold {', '.join(parts)}: by so much of our error it is further off for it."
+    return f"MuJoCo cannot hold {', '.join(parts)}: by so much our own error grows when it is left out."
+
+
+def _percent(share: float) -> str:
+    percent = 100.0 * share
+    return f"{percent:.0f} %" if percent >= 9.95 else f"{percent:.2g} %"
 
 
 def _ratio(one: SignalLoss) -> str:

@@ -284,13 +284,17 @@ class KeepButtons:
         self._provenance = provenance
         self._folder, self._viewer, self._save = folder, viewer, save
         self._asked: viser.ClientHandle | None = None  # who is sent the file
-        gui = page.server.gui
+        self._gui = gui = page.server.gui
         add_html(gui, IN_ROW)
         for one in buttons:
-            button = gui.add_button(one.label, icon=one.icon, hint=one.hint)
-            button.on_click(lambda event, suffix=one.suffix, button=button: self._ask(event.client, suffix, button))
+            self.add(one)
         self._links = add_html(gui)
         kept.connect(lambda path: page.screen.post(f"{what} kept {path.suffix}", lambda: self._kept(path)))
+
+    def add(self, one: Keeps) -> None:
+        """One more button, where the page is being built."""
+        button = self._gui.add_button(one.label, icon=one.icon, hint=one.hint)
+        button.on_click(lambda event: self._ask(event.client, one.suffix, button))
 
     def clear(self) -> None:
         """Something else is shown: what was kept before is told no more."""

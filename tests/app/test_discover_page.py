@@ -126,6 +126,7 @@ def test_one_effect_with_the_guide(discover, app):
     wait_until(lambda: drawn(page, "Error after each step") == 2)
     wait_until(lambda: drawn(page, "What the residual depends on") > 2)
     page.locator("math", has_text="sin").first.wait_for()
+    page.get_by_role("button", name="Take it home", exact=True).wait_for()
     kept = ("Save report", "Record", "Save model", "Use in Explore")
     wait_until(lambda: in_one_row_without_scrolling(page, kept), 20.0)  # the panel takes its width a moment later
     assert revealed(page).startswith("Your answer agrees")

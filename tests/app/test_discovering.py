@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import time
+import zipfile
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -222,6 +224,18 @@ def test_what_is_kept_opens_again(fresh):
     for suffix in (".html", ".rrd", ".toml"):
         fresh.keep(suffix)
         wait_until(lambda suffix=suffix: any(path.suffix == suffix for path in kept))
+    told = []
+    fresh.events.verified.connect(lambda path, text: told.append((path.suffix, text)))
+    assert fresh.take_home()
+    wait_until(lambda: not fresh.running)
+    (home,) = (path for path in kept if path.suffix == ".zip")
+    with zipfile.ZipFile(home) as archive:
+        names = {Path(name).suffix for name in archive.namelist()}
+        assert {".c", ".h", ".py", ".toml"} <= names and "cogging_torque_amplitude_Nm" in archive.read(
+            "thesis_ema.h"
+        ).decode()
+        assert "replayed on" in archive.read("LOSS.txt").decode()
+    assert next(text for suffix, text in told if suffix == ".zip").startswith("C as the model")
     report, recording, model = (next(p for p in kept if p.suffix == s) for s in (".html", ".rrd", ".toml"))
     assert "Cogging torque" in report.read_text(encoding="utf-8")
     assert read(recording) is not None

@@ -88,7 +88,7 @@ def test_what_it_cannot_hold_is_told_and_made_up_for(tmp_path):
     (found,) = result.targets
     shares = {one.what: one.share for one in found.cannot_hold}
     assert shares["load-dependent friction"] > shares["dead time"] > 0.01
-    assert "MJCF cannot hold load-dependent friction (" in str(result) and "Fitted by replay" in str(result)
+    assert "MuJoCo cannot hold load-dependent friction (" in str(result) and "Fitted by replay" in str(result)
     raw = mjcf.replayed_in_mujoco(proof_of(exported(actuator), [recorded], silent), {}, silent)[0]
     assert found.signals["user_position_rad"].rmse < 0.5 * raw.signals["user_position_rad"].rmse
     assert mujoco.MjModel.from_xml_path(str(tmp_path / "home" / "arm.xml")).njnt == 1
@@ -140,7 +140,8 @@ def test_a_joint_comes_back_as_the_actuator(name, tmp_path):
 
 
 ROBOT = """
-<mujoco><default><joint damping="2"/><default class="arm"><joint armature="0.01" frictionloss="0.5"/></default></default>
+<mujoco><default><joint damping="2"/>
+<default class="arm"><joint armature="0.01" frictionloss="0.5"/></default></default>
 <worldbody><body><joint name="shoulder" class="arm" type="hinge" axis="0 1 0" range="-90 90"/>
 <geom type="capsule" fromto="0 0 0 0 0 0.3" size="0.04"/>
 <body pos="0 0 0.3"><joint name="elbow" class="arm" axis="0 1 0"/><geom size="0.05"/>

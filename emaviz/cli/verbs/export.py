@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import argparse
+from collections.abc import Mapping
+from typing import Any
 
 from ema_model.members import stated_in
 from emaviz.cli import options
@@ -30,6 +32,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--fmi", choices=stated_in("ema_model.exports.fmu", "VERSIONS"), default="3.0", help="the version of an FMU"
     )
     options.add_mapping(parser)
+    options.add_report(parser)
     options.add_json(parser)
     parser.set_defaults(runs=None, start_s=None, stop_s=None)  # recordings are replayed as they are
 
@@ -66,6 +69,12 @@ def run(arguments: argparse.Namespace) -> int:
             fmi=arguments.fmi,
             on_progress=progress.show,
         )
-        return flow.finish(arguments, flow.Answer(result, as_dict(result)), progress)
+
+        def report(path: str, _: Mapping[str, Any]) -> None:
+            from emaviz.report import write_export_report
+
+            write_export_report(result, path)
+
+        return flow.finish(arguments, flow.Answer(result, as_dict(result), report=report), progress)
     finally:
         progress.done()

@@ -32,7 +32,7 @@ from emaviz.figures import discovery
 from emaviz.figures.discovery import equation
 from emaviz.page.discover import WORKSPACE
 from emaviz.page.discover.candidate import CONFIG, EffectView
-from emaviz.page.panel import Cleared
+from emaviz.page.panel import KeepButtons, Keeps
 from emaviz.page.playback import PlaybackStrip
 from emaviz.page.window_layout import COLUMNS, NEXT_COLUMN
 from emaviz.page.workspaces import Page
@@ -167,6 +167,12 @@ _STEPS = (
     Html("Press <b>Start</b>: the model is calibrated, and its residual is compared with every effect of the library."),
     "Add an effect: the error falls, also on what was held out. Then save the improved model, or use it in Explore.",
 )
+HOME = Keeps(
+    "Take it home",
+    ".zip",
+    viser.Icon.PACKAGE_EXPORT,
+    "The improved model as C, FMU, MJCF and Python in one .zip, each replayed on the recordings with its loss",
+)
 _LADDER_PX = 215, 290, 330, 685  # least, in one column, most, and what a window holds beside it
 
 
@@ -182,7 +188,7 @@ class DiscoveryPanel:
         page: Page,
         discovering: Discovering,
         strip: PlaybackStrip,
-        keep: Callable[[], Cleared],
+        keep: Callable[[], KeepButtons],
         leads: Callable[[], object],
         load: Callable[[Any, viser.ClientHandle | None], None],
     ) -> None:
@@ -206,6 +212,7 @@ class DiscoveryPanel:
         self._model_folder = gui.add_folder("The improved model", visible=False)
         with self._model_folder:
             self._equation = add_html(gui)
+            self._kept.add(HOME)
         self._before_folder = gui.add_folder("Before and after", visible=False)
         with self._before_folder:
             add_html(gui, NEXT_COLUMN)

@@ -20,7 +20,7 @@ from ema_model.faults import CAUSES
 from ema_model.quantities.numbers import number
 from emaviz.page.discover import WORKSPACE, candidate
 from emaviz.page.discover.candidate import OwnEffect
-from emaviz.page.discover.result import DiscoveryPanel
+from emaviz.page.discover.result import HOME, DiscoveryPanel
 from emaviz.page.explore.tab import ExploreTab, take_experiment
 from emaviz.page.panel import JobLine, KeepButtons, Keeps, Lead, Leads
 from emaviz.page.tab import Shared, Standing, Tab
@@ -321,21 +321,27 @@ _BUTTONS = (
 
 
 class DiscoveryKeep(KeepButtons):
-    """Three buttons, and what they have written; of the model also whether it is what was found."""
+    """Buttons, and what they have written; of the model also whether it is what was found, and what a tool loses."""
 
     def __init__(self, page: Page, discovering: Discovering, viewer: ViewerHost | None) -> None:
-        events = discovering.events
+        events, self._discovering, self._page = discovering.events, discovering, page
         super().__init__(
             page,
             "discovery",
             discovering.folder,
             viewer,
             events.kept,
-            lambda suffix, _: discovering.keep(suffix),
+            self._write,
             discovering.provenance,
             *_BUTTONS,
         )
         events.verified.connect(lambda path, text: page.screen.post("verified", lambda: self.name(path, text)))
+
+    def _write(self, suffix: str, button: Any) -> None:
+        if suffix == HOME.suffix:
+            self._page.ask("take home", lambda: self._page.begins(self._discovering.take_home, button))
+        else:
+            self._discovering.keep(suffix)
 
     def said_at_once(self, path: Path) -> str:
         """The model is read back and simulated again."""

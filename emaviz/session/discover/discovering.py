@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import zipfile
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
@@ -23,7 +25,10 @@ from ema_model.discovery.words import effect_title, verification
 from ema_model.effects import CATALOGUE
 from ema_model.effects.user import Expression, UserEffect, parse
 from ema_model.errors import InputError, quoted
+from ema_model.exports.replay import EXACT
+from ema_model.exports.result import TargetProof
 from ema_model.faults import NAMES
+from ema_model.files.written import whole_file
 from ema_model.quantities.titles import in_sentence
 from emaviz.session.compare import Comparing
 from emaviz.session.data_folder import DataFolder
@@ -132,6 +137,32 @@ def keep(look: Look, folder: DataFolder, suffix: str) -> Path:
     else:
         save_actuator(found.actuator, path)
     return path
+
+
+def home(look: Look, folder: DataFolder, tell: Tell) -> tuple[Path, str]:
+    """A .zip with the improved model for every tool that is there, its loss in words beside; and a line of it."""
+    from ema_model.exports.export import at_hand, export  # takes a while, and few ask for it
+
+    names, lines = at_hand()
+    path = folder.fresh(folder.recordings, "home", ".zip")
+    with TemporaryDirectory(prefix=".home-", dir=folder.recordings) as scratch:
+        out = Path(scratch) / "model"
+        result = export(look.found.actuator, names, look.found.plant.recorded, out, on_progress=tell)
+        save_actuator(look.found.actuator, out / f"{result.one.name}.toml")
+        (out / "LOSS.txt").write_text("\n".join([str(result), *lines, ""]), encoding="utf-8")
+        with whole_file(path) as draft, zipfile.ZipFile(draft, "w", zipfile.ZIP_DEFLATED) as archive:
+            for file in sorted(out.iterdir()):
+                archive.write(file, file.name)
+    parts = [f"{one.title} {_nearness(one)}" for one in result.targets]
+    return path, "; ".join([*parts, *lines])
+
+
+def _nearness(one: TargetProof) -> str:
+    """'as the model', or how much further off than ours it is."""
+    if one.difference <= EXACT:
+        return "as the model"
+    ratios = [signal.rmse / signal.rmse_ours for signal in one.signals.values() if signal.rmse_ours > 0.0]
+    return f"{max(ratios):.2f} times our error" if ratios else f"within {100.0 * one.difference:.2g} %"
 
 
 # --- the session's part of Discover: which recordings, the story so far, and its steps on the compute thread ----------
@@ -395,6 +426,19 @@ class Discovering:
         self.events.looked(None)
 
     # --- what stays -------------------------------------------------------------------------------------------------
+
+    def take_home(self) -> bool:
+        """Begins to write the model for other tools, each replayed on what was fitted, as a .zip in the data folder."""
+        look = self.look
+        if look is None:
+            raise InputError("nothing is discovered yet; press Start first")
+
+        def job(tell: Tell) -> None:
+            path, told = home(look, self.folder, tell)
+            self.events.kept(path)
+            self.events.verified(path, told)
+
+        return self.job.begin("Taking the model home", job)
 
     def keep(self, suffix: str) -> None:
         """Writes the report (.html), the recording (.rrd) or the improved model (.toml) into the data folder, soon."""

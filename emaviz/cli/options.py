@@ -77,6 +77,8 @@ RECORDINGS = replace(RECORDING, several=True)
 UNITS = replace(RECORDINGS, in_folders=True)
 HELD_OUT = replace(RECORDINGS, is_file=lambda text: not _is_pattern(text))
 ACTUATOR = Input("an actuator file (.toml)")
+# an MJCF model, and of which joint: whoever reads it splits the two
+JOINT = Input("an MJCF model (.xml)", is_file=lambda text: "#" not in text)
 JSON = Output((".json",), is_kept=False)
 REPORT = Output((".html", ".htm"), is_kept=False)
 RRD = Output((".rrd",))

@@ -56,5 +56,5 @@ def needed(command: str, recording: str, but: argparse.Action | None = None) -> 
         elif isinstance(action.type, Output) and not action.option_strings:
             given.append(f"needed{action.type.suffixes[0]}")
         elif action.required and action.option_strings:
-            given += [action.option_strings[0], "needed.csv"]
+            given += [action.option_strings[0], *(action.choices or ("needed.csv",))][:2]
     return given

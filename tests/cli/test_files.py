@@ -66,10 +66,12 @@ def test_no_output_is_an_input(command, source, target, spelling, tmp_path, caps
         other.symlink_to(real)
         real, other = other, real
     least = needed(command, "in2.csv", source)
+    if not target.option_strings:
+        least.remove(f"needed{target.type.suffixes[0]}")
     if "in2.csv" in least or "needed.csv" in least:
         (tmp_path / "in2.csv").write_text("measured\n")
     told = refused([*least, *flag(source, real), *flag(target, other)], capsys)
-    assert "name another file" in told and f"{target.option_strings[0]} {other}: is" in told
+    assert "name another file" in told and f"{''.join(target.option_strings[:1])} {other}: is" in told
     assert (tmp_path / "in.csv").read_text() == "measured\n"
     assert set(os.listdir(tmp_path)) <= {"in.csv", "in2.csv", "other.csv"}
 

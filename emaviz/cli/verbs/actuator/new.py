@@ -29,6 +29,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--from",
         dest="model",
+        type=options.JOINT,
         metavar="MODEL.xml#JOINT",
         help="what an MJCF model says of a joint and of the actuator that drives it; options add to it",
     )

@@ -98,12 +98,10 @@ def exported(actuator: Actuator, name: str = "") -> Exported:
         notes.append("Its torque constant is a guess: torques, inertia and friction are known up to one common factor.")
     sensors = actuator.sensors
     if sensors.current_gain != 1.0 or sensors.current_bias_A != 0.0:
-        shown = f"{sensors.current_gain:g} times the current here, and {sensors.current_bias_A:+g} A".replace("-", "−")
+        shown = f"{sensors.current_gain:.4g} times the current here, and {sensors.current_bias_A:+.2g} A more"
         notes.append(f"Its recordings show {shown}; their sensor is no part of the export.")
     if sensors.delay_s != 0.0:
-        notes.append(
-            f"Its recordings are {1e3 * sensors.delay_s:g} ms late; that is no part of the export.".replace("-", "−")
-        )
+        notes.append(f"Its recordings are {1e3 * sensors.delay_s:.2g} ms late, which is no part of the export.")
     stack = own_stack(taken)
     program = program_of(stack)
     rows = dict(zip(stack.parameter_rows, monitor_rows(taken, taken.k, stack, {})[0].reshape(-1, LANES)[:, 0]))
@@ -122,7 +120,7 @@ def exported(actuator: Actuator, name: str = "") -> Exported:
         tuple(Field(field_name(one), 0.0, *meanings[one]) for one in (*STATE_ROWS, *stack.states)),
         _command(taken),
         {name: float(value) for name, value in rows.items()},
-        tuple(notes),
+        tuple(note.replace("-0", "−0") for note in notes),
     )
 
 

@@ -299,7 +299,7 @@ def _comment(lines: Sequence[str]) -> str:
 # --- run --------------------------------------------------------------------------------------------------------------
 
 _MOST_STEPS = 60_000  # of one replay while values are fitted
-_EVALUATIONS = 40
+_EVALUATIONS = 30
 _FARTHEST = math.log(20.0)  # that a value may go from its own
 _FITTED = ("armature", "damping", "frictionloss", "kp", "motorconst")
 _PULL = 0.02  # toward the model's own values, where the recordings tell nothing of them

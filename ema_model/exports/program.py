@@ -268,7 +268,6 @@ class _OfFunction:
     names: dict[str, Any] = field(default_factory=dict)  # variables in scope: expressions, or what stands for a kind
     flags: set[str] = field(default_factory=set)
     taken: set[str] = field(default_factory=set)
-    reads: set[str] = field(default_factory=set)
     writes: bool = False
     returns: list[tuple[Expression, ...]] = field(default_factory=list)
 
@@ -328,8 +327,9 @@ class _OfFunction:
                 case ast.Return(value=value):
                     found = self.expression(value) if value is not None else _Tuple(())
                     values = found.values if isinstance(found, _Tuple) else (found,)
-                    if isinstance(found, Call) and found.function.returns > 1:
-                        values = tuple(Part(found, i) for i in range(found.function.returns))
+                    if isinstance(found, Call) and found.function.returns > 1:  # which is called once
+                        values = tuple(self.fresh(f"value_{number}") for number in range(found.function.returns))
+                        yield Assign(values, found)
                     self.returns.append(values)
                     yield Return(values)
                 case ast.If(test=test, body=body, orelse=[]):
@@ -373,13 +373,16 @@ class _OfFunction:
             return before
         if before is not None and not outermost:
             raise self.wrong(target, "a name must not change its kind here")
-        name = target.id
+        self.names[target.id] = name = self.fresh(target.id)
+        if is_flag:
+            self.flags.add(name.name)
+        return name
+
+    def fresh(self, name: str) -> Name:
+        """A variable of this name, or of one like it that is not taken."""
         while name in self.taken:
             name += "_"
         self.taken.add(name)
-        if is_flag:
-            self.flags.add(name)
-        self.names[target.id] = Name(name)
         return Name(name)
 
     # expressions
@@ -495,7 +498,6 @@ class _OfFunction:
             names = self.reader.stack.parameter_rows
             if of == _STATE:
                 names = (*STATE_ROWS, *self.reader.stack.states)
-            self.reads.add(of)
             return Row(of, field_name(names[self.whole(node.slice) // LANES]))
         found = self.expression(node.value)
         index = self.whole(node.slice)

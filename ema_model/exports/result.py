@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Annotated, TypedDict
 
@@ -13,7 +13,7 @@ from msgspec import Meta
 from ema_model.exports.exported import Exported
 from ema_model.exports.replay import EXACT, RecordingLoss, SignalLoss
 from ema_model.quantities.axes import Axes, of_signal
-from ema_model.quantities.titles import all_of, in_sentence
+from ema_model.quantities.titles import all_of
 from ema_model.text import Document, InWords, Lines, Note, Table
 
 
@@ -156,11 +156,6 @@ def _percent(share: float) -> str:
 
 def _ratio(one: SignalLoss) -> str:
     return f"{one.rmse / one.rmse_ours:.3f}" if one.rmse_ours > 0.0 else "1" if one.rmse == 0.0 else "∞"
-
-
-def say_signals(names: Sequence[str], axes: Axes) -> str:
-    """'equivalent current, user position'."""
-    return ", ".join(in_sentence(of_signal(name, axes).title) for name in names)
 
 
 # --- as JSON ----------------------------------------------------------------------------------------------------------

@@ -1,6 +1,6 @@
 """The README's pictures, each of the page in its state: python tests/benchmarks/screenshots.py [NAME …]
 
-NAME is explore, identify, compare or discover; without one all four in assets/screenshots are replaced.
+NAME is explore, identify, compare, discover or export; without one all five in assets/screenshots are replaced.
 """
 
 from __future__ import annotations
@@ -98,13 +98,38 @@ def picture(chromium: Any, name: str) -> None:
         app.close()
 
 
+def export(chromium: Any, to: Path) -> None:
+    """The report of an export: of the model that was found in a challenge, on its recordings."""
+    with tempfile.TemporaryDirectory() as folder:
+        at = Path(folder)
+        emaviz(["challenge", "after_the_overhaul", "--out", str(at / "overhaul")])
+        files = [str(at / "overhaul" / f"{name}.parquet") for name in ("chirp", "step", "sine", "unseen")]
+        emaviz(["discover", *files[:3], "--holdout", files[3], "--save-actuator", str(at / "better.toml")])
+        targets = [word for name in ("c", "fmu", "mjcf") for word in ("--to", name)]
+        report = str(at / "home.html")
+        emaviz(["export", str(at / "better.toml"), *files, *targets, "--out", str(at / "home"), "--report", report])
+        show(chromium, report, to)
+
+
+def show(chromium: Any, report: str, to: Path) -> None:
+    """A report from its answer to its first chart."""
+    page = chromium.new_page(viewport={"width": 1100, "height": 1390})
+    page.goto(f"file://{report}")
+    page.wait_for_timeout(SETTLED_MS)
+    page.screenshot(path=to)
+    page.close()
+
+
 def main(names: list[str]) -> None:
     """Those that are named, or all."""
     path = os.environ.get("EMAVIZ_CHROMIUM") or shutil.which("chromium")
     with sync_playwright() as playwright:
         chromium = playwright.chromium.launch(executable_path=path, args=SOFTWARE_GL)
-        for name in names or STATES:
-            picture(chromium, name)
+        for name in names or (*STATES, export.__name__):
+            if name == export.__name__:
+                export(chromium, PICTURES / f"{name}.png")
+            else:
+                picture(chromium, name)
             print(PICTURES / f"{name}.png")
         chromium.close()
 

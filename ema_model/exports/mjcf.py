@@ -53,7 +53,8 @@ _SLIDES = 0.5  # the same of one that slides, whose dry friction MuJoCo weighs b
 _ARM = 0.01  # of the inertia, that a pendulum's mass makes at most
 _SOFT = 1e-6  # of a constant load, that a spring changes by in 1 rad
 _STIFF = 2.0  # steps in which dry friction takes hold; MuJoCo's own 20 ms let a joint creep
-_BRISTLES = 0.05  # rad in a step, of the fastest that bristles swing
+_BRISTLES = 0.2  # rad in a step, by which bristles swing that stand for none
+_DAMPED = 0.02  # of their critical damping: more is felt in motion
 
 
 def check() -> None:
@@ -186,7 +187,7 @@ def _lugre(
     elif "presliding_friction" not in effects:
         return None
     stiffness = inertia * (_BRISTLES / actuator.step_s) ** 2
-    damping = 2.0 * math.sqrt(stiffness * inertia)
+    damping = 2.0 * _DAMPED * math.sqrt(stiffness * inertia)
     if "presliding_friction" in effects:
         stiffness = effects["presliding_friction"]["stiffness_Nm_rad"]
         damping = effects["presliding_friction"]["damping_Nms_rad"]
@@ -378,7 +379,8 @@ def joints_of(proof: Proof) -> list[Joint]:
     for window in proof.windows:
         actuator, values, _ = kernel_values(proof, window)
         supply = float(_even(window).max())
-        found.append(joint_of(actuator, {**values, "bus_voltage": values["bus_voltage"] * supply}))
+        at_step = replace(actuator, step_s=window.step_s)
+        found.append(joint_of(at_step, {**values, "bus_voltage": values["bus_voltage"] * supply}))
     return found
 
 

@@ -390,7 +390,7 @@ def export(
 
     actuator: as loaded, calibrated or improved.
     out: the folder that is written, which is new or empty.
-    to: targets: "c", "fmu", "python".
+    to: targets: "c", "fmu", "mjcf", "python".
     of: files' names or recordings to replay; without any, a run is made for it.
     name: of files and functions; the actuator's own without one.
     fmi: the version of FMUs: "3.0" or "2.0".

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import secrets
 import shutil
 import tempfile
 from collections.abc import Callable, Sequence
@@ -13,7 +14,7 @@ from ema_model.actuator import Actuator
 from ema_model.errors import InputError, did_you_mean, quoted
 from ema_model.exports import c, fmu, mjcf, python
 from ema_model.exports.exported import Exported, exported
-from ema_model.exports.replay import Proof, kernel_values, proof_of, replayed, shortened
+from ema_model.exports.replay import Proof, proof_of, replayed, shortened
 from ema_model.exports.result import Export, TargetProof
 from ema_model.recordings import Measurement
 
@@ -21,7 +22,7 @@ Progress = Callable[[str], None]
 
 NAMES = ("c", "fmu", "mjcf", "python")  # of targets
 _MOST_PYTHON_STEPS = 20_000  # of a proof: each takes a fifth of a millisecond
-_MOST_FMU_STEPS = 500_000  # each takes ten microseconds
+_MOST_STEPS = 500_000  # the same of an FMU and of MuJoCo: each takes ten microseconds
 
 
 @dataclass(frozen=True)
@@ -66,7 +67,7 @@ def _write_fmu(order: Order) -> TargetProof:
         raise InputError(f"the FMU is not valid: {problems[0]}")
     with tempfile.TemporaryDirectory(prefix="emaviz-export-") as scratch:
         running = fmu.RunningFmu(order.one, path, Path(scratch))
-        losses = replayed(shortened(order.proof, _MOST_FMU_STEPS), running, order.progress)
+        losses = replayed(shortened(order.proof, _MOST_STEPS), running, order.progress)
     checked = f"FMI {order.fmi} co-simulation, valid by fmpy and run in it"
     return TargetProof("fmu", "FMU", (path.name,), checked, tuple(losses))
 
@@ -75,14 +76,12 @@ def _write_mjcf(order: Order) -> TargetProof:
     import mujoco  # takes a while, and need not be there
 
     one, proof, progress = order.one, order.proof, order.progress
-    _, rows, _ = kernel_values(proof, proof.windows[0])
-    joint = mjcf.joint_of(one.actuator, {**rows, **one.rows})
-    cannot = mjcf.losses(shortened(proof, _MOST_FMU_STEPS), progress)
-    joint, factors = mjcf.fitted(proof, joint, progress)
+    cannot = mjcf.losses(shortened(proof, _MOST_STEPS), progress)
+    joint, factors = mjcf.fitted(proof, mjcf.joint_of(one.actuator, one.rows), progress)
     notes = mjcf.in_words(joint, factors)
     path = order.folder / f"{one.name}.xml"
     path.write_text(mjcf.document(one, joint, notes), encoding="utf-8")
-    found = mjcf.replayed_in_mujoco(shortened(proof, _MOST_FMU_STEPS), factors, progress)
+    found = mjcf.replayed_in_mujoco(shortened(proof, _MOST_STEPS), factors, progress)
     return TargetProof(
         "mjcf", "MJCF", (path.name,), f"run in MuJoCo {mujoco.__version__}", tuple(found), tuple(cannot), tuple(notes)
     )
@@ -136,14 +135,14 @@ def export(
         TARGETS[target].check()
     one = exported(actuator, name)
     proof = proof_of(one, recordings, progress)
-    draft = Path(tempfile.mkdtemp(prefix=f".{folder.name[:40]}-", dir=folder.parent))
+    draft = folder.parent / f".{folder.name[:40]}-{secrets.token_hex(4)}"
     try:
+        draft.mkdir()
         proofs = []
         for target in wanted:
             progress(f"writing {TARGETS[target].title}")
             proofs.append(TARGETS[target].write(Order(one, draft, proof, fmi, progress)))
         found = Export(one, str(out), tuple(proofs), proof.simulated, tuple(m.name for m in recordings))
-        draft.chmod(0o777 & ~_umask())
         shutil.rmtree(draft / "__pycache__", ignore_errors=True)
         if folder.is_dir():  # it is empty, and some systems do not put a folder in its place
             folder.rmdir()
@@ -180,9 +179,3 @@ def check_folder(out: str | os.PathLike[str]) -> Path:
     if not os.access(folder.parent, os.W_OK):
         raise InputError(f"{quoted(out)}: no permission to write in {quoted(folder.parent)}")
     return folder
-
-
-def _umask() -> int:
-    mask = os.umask(0)
-    os.umask(mask)
-    return mask

@@ -191,6 +191,8 @@ def where(test, then, otherwise):
     """One of two, joint by joint."""
     if isinstance(test, bool):
         return then if test else otherwise
+    if isinstance(then, float) and isinstance(otherwise, float):  # of which torch would make float32
+        then = xp.asarray(then, dtype=xp.float64)
     return xp.where(test, then, otherwise)
 
 
@@ -281,9 +283,9 @@ _TORQUE = '''
             current, active, static, dynamic, dry, resisting = {part}
             s.current, s.time = current, s.time + dt
             bristles = resisting != dry
-            load = 0.0
+            load = still = 0.0 * s.omega
             {advance_states}
-            return where(bristles, active - resisting, active) / gear, where(bristles, 0.0, dynamic) / gear
+            return where(bristles, active - resisting, active) / gear, where(bristles, still, still + dynamic) / gear
 '''
 _TURN = '''
 

@@ -148,6 +148,23 @@ def test_joints_side_by_side_in_python_are_those_alone(tmp_path):
     assert together.theta.tolist() == [float(state.theta[0]) for state in apart]
 
 
+@pytest.mark.parametrize("effect", ["stribeck_friction", "sampled_control", "pendulum_load"])
+def test_torch_gives_numpys_numbers(effect, tmp_path):
+    torch = pytest.importorskip("torch", reason="torch is in no lock; the exported Python takes it, too")
+    settings = CATALOGUE[effect].at_severity(1)
+    one = written(replace(load_actuator(ACTUATORS / "thesis.toml"), effects={effect: settings}), tmp_path)
+    module = python.ImportedPython(one, tmp_path).module
+
+    def shown(arrays, array):
+        model = module.Model(arrays)
+        state = model.begin(array([0.0, 1e-3]))
+        for _ in range(100):
+            state = model.step(state, array([2e-3, 5e-3]))
+        return [np.asarray(values).tolist() for values in model.shown(state).values()]
+
+    assert shown(torch, lambda x: torch.tensor(x, dtype=torch.float64)) == shown(np, np.array)
+
+
 def test_a_joint_that_a_simulator_moves_takes_the_torque(tmp_path):
     """A simulator that integrates the joint with the inertia as armature and the dry friction moves as ours."""
     actuator = replace(load_actuator(ACTUATORS / "xl330.toml"), effects={})

@@ -13,6 +13,7 @@ import importlib.util
 import itertools
 import math
 import re
+import time
 from collections.abc import Callable, Mapping, Sequence
 from copy import copy
 from dataclasses import dataclass, replace
@@ -24,12 +25,14 @@ from numpy.typing import NDArray
 
 from ema_model.actuator import Actuator
 from ema_model.effects import catalogue_name, find
+from ema_model.effects.user import UserEffect
 from ema_model.errors import InputError, quoted
 from ema_model.exports.exported import Exported
 from ema_model.exports.replay import Proof, RecordingLoss, kernel_values, loss_of, shortened
 from ema_model.exports.result import CannotHold
 from ema_model.models.loop_window import COMPARED, LoopWindow
 from ema_model.quantities.sides import USER
+from ema_model.quantities.titles import in_sentence
 
 Array = NDArray[np.float64]
 
@@ -98,7 +101,8 @@ class Joint:
 def joint_of(actuator: Actuator, rows: Mapping[str, float]) -> Joint:
     """The joint of an actuator whose kernels' parameters are these, by name."""
     tau = rows["gear_ratio"]
-    effects = {catalogue_name(name): given for name, given in actuator.effects.items()}
+    # of several of a kind the first
+    effects = {catalogue_name(name): given for name, given in reversed(list(actuator.effects.items()))}
 
     def of(effect: str, name: str, default: float = 0.0) -> float:
         return float(effects[effect][name]) if effect in effects else default
@@ -454,8 +458,6 @@ def replayed_in_mujoco(
     proof: Proof, factors: Mapping[str, float], progress: Callable[[str], None]
 ) -> list[RecordingLoss]:
     """MuJoCo over every window."""
-    import time
-
     found = []
     for place, (window, own) in enumerate(zip(proof.windows, joints_of(proof))):
         progress(f"replaying {window.name or 'a run'} in MuJoCo ({place + 1} of {len(proof.windows)})")
@@ -478,6 +480,8 @@ def in_words(joint: Joint, factors: Mapping[str, float]) -> list[str]:
 
 # --- what MuJoCo cannot hold ------------------------------------------------------------------------------------------
 
+_LEAST = 5e-4  # of our error, from which on a part is told
+
 
 def losses(proof: Proof, progress: Callable[[str], None]) -> list[CannotHold]:
     """Each part of the model that MuJoCo has no form for, the greatest first.
@@ -487,6 +491,7 @@ def losses(proof: Proof, progress: Callable[[str], None]) -> list[CannotHold]:
     """
     actuator = proof.one.actuator
     left_out: list[tuple[str, dict[str, float], bool]] = []  # what, the values without it, whether the supply is even
+    found: list[CannotHold] = []
     seen: set[str] = set()
     for name in actuator.effects:
         kind = catalogue_name(name)
@@ -494,8 +499,13 @@ def losses(proof: Proof, progress: Callable[[str], None]) -> list[CannotHold]:
             seen.add(kind)  # a second one of the kind has no place
             continue
         effect = find(name, actuator.axes)
-        first = effect.parameters[0].name
-        left_out.append((effect.title.lower(), {f"effects.{name}.{first}": effect.nothing}, False))
+        without = {f"effects.{name}.{parameter.name}": 0.0 for parameter in effect.parameters}
+        if not isinstance(effect, UserEffect):
+            without = {f"effects.{name}.{effect.parameters[0].name}": effect.nothing}
+        elif effect.kind != "torque_curve":  # nobody knows with which values an expression is nothing
+            found.append(CannotHold(in_sentence(effect.title), math.nan))
+            continue
+        left_out.append((in_sentence(effect.title), without, False))
     motor, controller, transmission = actuator.motor, actuator.controller, actuator.transmission
     if transmission.backlash_rad > 0.0:
         left_out.append(("backlash", {"transmission.backlash_rad": 0.0}, False))
@@ -509,16 +519,12 @@ def losses(proof: Proof, progress: Callable[[str], None]) -> list[CannotHold]:
             left_out.append(("the derivative action", {"controller.derivative_gain_Nms2_rad": 0.0}, False))
     if not actuator.takes_voltage and any(np.any(_even(one) != one.supply) for one in proof.windows):
         left_out.append(("a supply that changes in a run", {}, True))
-    found = []
     for what, values, even in left_out:
         progress(f"the model without {what}")
         share = _share(proof, actuator.varied(values), even)
         if not math.isfinite(share) or share >= _LEAST:
             found.append(CannotHold(what, share))
     return sorted(found, key=lambda one: -one.share if math.isfinite(one.share) else 0.0)
-
-
-_LEAST = 5e-4  # of our error, from which on it is told
 
 
 def _share(proof: Proof, without: Actuator, even: bool) -> float:

@@ -11,9 +11,11 @@ import pytest
 
 import ema_model as em
 from ema_model.actuator import load_actuator
+from ema_model.effects.user import torque_curve, user_torque
 from ema_model.exports import mjcf
 from ema_model.exports.exported import exported
 from ema_model.exports.replay import proof_of
+from ema_model.exports.result import as_dict
 from ema_model.recordings import Measurement
 from emaviz.cli import main
 
@@ -94,6 +96,16 @@ def test_what_it_cannot_hold_is_told_and_made_up_for(tmp_path):
     raw = mjcf.replayed_in_mujoco(proof_of(exported(actuator), [recorded], silent), {}, silent)[0]
     assert found.signals["user_position_rad"].rmse < 0.5 * raw.signals["user_position_rad"].rmse
     assert mujoco.MjModel.from_xml_path(str(tmp_path / "home" / "arm.xml")).njnt == 1
+
+
+def test_users_own_torques_are_told(tmp_path):
+    """A curve is left out by its knots; of an expression nobody knows what would be nothing, and it is named alone."""
+    curve, torque = torque_curve([0.02, -0.02, 0.03], -0.5, 0.5, "user"), user_torque("0.01*sin(3*theta)")
+    effects = {curve.name: {p.name: p.default for p in curve.parameters}, torque.name: {}}
+    result = em.export(replace(bare("xl330"), effects=effects), tmp_path / "home", ["mjcf"])
+    shares = {one.what: one.share for one in result.targets[0].cannot_hold}
+    assert shares["torque curve"] > 0.01 and np.isnan(shares["user's torque"])
+    assert as_dict(result)["export"]["mjcf"]["cannot_hold"][-1] == {"what": "user's torque", "share": None}
 
 
 def test_a_drive_that_is_off_lets_the_joint_go(tmp_path):

@@ -133,6 +133,22 @@ def test_two_effects_are_added_one_after_the_other():
     assert found.ladder[-1].rmse < 1.1 and found.ladder[-1].holdout_rmse < 1.1
 
 
+@pytest.mark.long
+@pytest.mark.parametrize(
+    ("hidden", "settings", "false"),
+    [
+        # held out in mid motion, from a log that is late: a command that stood still before it began with a jump
+        ("acceleration_feedforward", {"inertia_kgm2": 8e-6}, "current_sensor_gain"),
+        # thousands of floors off, where the model's own floor is another one
+        ("goal_delay", {"delay_s": 0.004}, "stribeck_friction"),
+    ],
+)
+def test_no_second_effect_is_named_beside_one_of_the_drive(hidden, settings, false):
+    found = _found({hidden: settings}, among=(hidden, false))
+    assert [one.name for one in found.effects] == [hidden] and not found.faults
+    assert found.ladder[-1].rmse < 1.1 and found.ladder[-1].holdout_rmse < 1.2
+
+
 def test_an_engine_that_is_not_there_is_refused():
     with pytest.raises(InputError, match="no engine 'evidenc'; there are steps, evidence; did you mean 'evidence'"):
         discover(recorded(41, commands=COMMANDS[:1]), ACTUATOR, engine="evidenc")

@@ -37,11 +37,16 @@ def written(actuator, folder):
     return one
 
 
+def moves(proof):
+    """Whether the motor does, in any of the runs."""
+    return any(np.ptp(shown["motor_position_rad"]) > 0.0 for shown in proof.ours)
+
+
 def differences(actuator, folder, recordings=()):
     """The most that C and Python differ from the monitor model by."""
     one = written(actuator, folder)
     proof = proof_of(one, list(recordings), silent)
-    assert any(np.ptp(shown["motor_position_rad"]) > 0.0 for shown in proof.ours), "nothing moves, nothing is proved"
+    assert moves(proof), "nothing moves, nothing is proved"
     short = shortened(proof, PYTHON_STEPS)
     found = []
     for part, export in ((proof, c.CompiledC(one, folder)), (short, python.ImportedPython(one, folder))):
@@ -68,8 +73,15 @@ def test_of_each_effect(name, effect, tmp_path):
     actuator = load_actuator(ACTUATORS / f"{name}.toml")
     if reason := cannot_represent(actuator, effect):
         pytest.skip(reason)
-    settings = CATALOGUE[effect].on(actuator.axes).at_severity(1)
-    found = differences(replace(actuator, effects={**actuator.effects, effect: settings}), tmp_path)
+    clear = CATALOGUE[effect].on(actuator.axes).at_severity(1)
+    first = next(iter(clear))
+    # what is clear on the library's own machine holds a small servo still
+    for share in (1.0, 0.1, 10.0):
+        settings = {**clear, first: share * clear[first]}
+        with_it = replace(actuator, effects={**actuator.effects, effect: settings})
+        if moves(proof_of(exported(with_it), [], silent)):
+            break
+    found = differences(with_it, tmp_path)
     print(f"\n{name} {effect}: C {found[0]:.1e}, Python {found[1]:.1e}")
     assert max(found) <= EXACT
 

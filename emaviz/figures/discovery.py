@@ -31,7 +31,7 @@ from ema_model.quantities.variables import of_variable, variable_title
 from ema_model.simulation.with_effect import SHOWN, WithEffect, few_periods
 from emaviz.colours import DIFFERENCE, FITTED, HELD_OUT, MONITOR, REFERENCE
 from emaviz.figures import theme
-from emaviz.figures.lines import LiveLines, lines
+from emaviz.figures.lines import Lines, LiveLines
 from emaviz.figures.runs import LAST_MORE_PX, PLANT_LINE, charts, legend, time_axis, value_axis
 from emaviz.figures.theme import Binned, Series, binned, chart, edges_for, envelope, line, scattered, svg_number
 from emaviz.text.html import Html, add_html, html, joined, mathml
@@ -495,8 +495,8 @@ class EffectCharts(LiveLines):
             with_it, without = felt.with_it[of.signal], felt.without[of.signal]
             two = ("without", REFERENCE, of.scale * without), ("with the effect", MONITOR, of.scale * with_it)
             apart = "difference", DIFFERENCE, of.difference_scale * (with_it - without)
-            every.append(lines(of.title, of.unit, time, *two, difference=(1, 0)))
-            every.append(lines(f"{of.title}, difference", of.difference_unit, time, apart))
+            every.append(Lines.of(of.title, of.unit, time, *two, difference=(1, 0)))
+            every.append(Lines.of(f"{of.title}, difference", of.difference_unit, time, apart))
             both.visible = change.visible = True
         self.draw(every)
 

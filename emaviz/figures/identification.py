@@ -22,7 +22,7 @@ from ema_model.recordings import Measurement
 from emaviz.colours import ALGORITHMS, COMMAND, DIFFERENCE, FAULT, MONITOR, REFERENCE, TRUTH
 from emaviz.colours import MONITOR_SHADES as SHADES
 from emaviz.figures import theme
-from emaviz.figures.lines import LiveLines, lines
+from emaviz.figures.lines import Lines, LiveLines
 from emaviz.figures.runs import (
     AXIS,
     CURSOR,
@@ -637,8 +637,8 @@ class LiveFit(LiveLines):
         both = ("measured", REFERENCE, measured_A), *fitted
         self.draw(
             [
-                lines("Measured and fitted current", "A", time_s, *both, difference=(1, 0)),
-                lines(_FITTED_CURRENT_LEFT, "A", time_s, *apart),
+                Lines.of("Measured and fitted current", "A", time_s, *both, difference=(1, 0)),
+                Lines.of(_FITTED_CURRENT_LEFT, "A", time_s, *apart),
             ]
         )
         end = theme.end_of(left)
@@ -716,7 +716,7 @@ class LiveFan(LiveLines):
             drawn = [(*of, chart.scale * one[chart.signal]) for *of, one in zip(labels, SHADES, runs)]
             if chart.with_command:
                 drawn.append(("command", COMMAND, chart.scale * runs[0]["command_rad"]))
-            every.append(lines(chart.title, chart.unit, runs[0].time_s, *drawn, difference=(len(runs) - 1, 0)))
+            every.append(Lines.of(chart.title, chart.unit, runs[0].time_s, *drawn, difference=(len(runs) - 1, 0)))
             named = [_fan_line(label, shade) for label, shade in zip(labels, SHADES)]
             if [one.get("label") for one in handle.series[1 : 1 + len(named)]] != list(labels):
                 handle.series = (handle.series[0], *named, *handle.series[1 + len(named) :])

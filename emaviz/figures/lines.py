@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -29,21 +29,36 @@ class Line:
     colour: str
     time_s: Array
     values: Array
+    dash: str = "solid"
 
 
 @dataclass(frozen=True, eq=False)
 class Lines:
-    """Of one chart.  difference: which line less which is its difference; None where that has no meaning."""
+    """Of one chart.  difference: which line less which is its difference, None where that has no meaning; time: what
+    stands below."""
 
     title: str
     unit: str
     lines: Sequence[Line]
     difference: tuple[int, int] | None = None
+    time: str = "Time [s]"
 
+    @property
+    def every_time_s(self) -> Array:
+        """Of all lines, rising."""
+        return np.unique(np.concatenate([one.time_s for one in self.lines]))
 
-def lines(title: str, unit: str, time_s: Array, *named: tuple[str, str, Array], **more: Any) -> Lines:
-    """Of one time base; named: name, colour and values of each."""
-    return Lines(title, unit, [Line(name, colour, time_s, values) for name, colour, values in named], **more)
+    @classmethod
+    def of(
+        cls,
+        title: str,
+        unit: str,
+        time_s: Array,
+        *named: tuple[str, str, Array],
+        difference: tuple[int, int] | None = None,
+    ) -> Lines:
+        """On one time base; named: name, colour and values of each."""
+        return cls(title, unit, [Line(name, colour, time_s, values) for name, colour, values in named], difference)
 
 
 def within(time_s: Array, window_s: Window | None) -> slice:
@@ -54,6 +69,17 @@ def within(time_s: Array, window_s: Window | None) -> slice:
     last = int(np.searchsorted(time_s, window_s[1] + 1e-9, side="right"))
     first = max(min(first, len(time_s) - 2), 0)
     return slice(first, max(last, first + 2))
+
+
+def clipped(window_s: Window | None, time_s: Array) -> Window | None:
+    """The part of a window in which there are samples, three steps of them at least; None where that is all."""
+    if window_s is None or len(time_s) < 2:
+        return None
+    start, end = float(time_s[0]), float(time_s[-1])
+    least = min(3.0 * (end - start) / (len(time_s) - 1), end - start)
+    low = min(max(window_s[0], start), end - least)
+    high = max(min(window_s[1], end), low + least)
+    return (low, high) if low > start or high < end else None
 
 
 class LiveLines:
@@ -70,7 +96,7 @@ class LiveLines:
 
     def zoom(self, window_s: Window | None) -> None:
         """Draws this window from now on; None: all."""
-        self._window_s = window_s
+        self._window_s = clipped(window_s, self._drawn[0].lines[0].time_s) if self._drawn else None
         self._redraw()
 
     def draw(self, every: Sequence[Lines]) -> None:
@@ -103,12 +129,27 @@ def of_window(one: Lines, window_s: Window | None) -> Lines:
         if len(each.time_s) > 1:
             part = within(each.time_s, window_s)
             if np.any(np.isfinite(each.values[part])):
-                inside.append(Line(each.name, each.colour, each.time_s[part], each.values[part]))
+                inside.append(replace(each, time_s=each.time_s[part], values=each.values[part]))
     return Lines(one.title, one.unit, inside)
 
 
 def _said(window_s: Window | None) -> str:
     return "" if window_s is None else f", {window_s[0]:.4g} … {window_s[1]:.4g} s"
+
+
+def drawn(one: Lines, window_s: Window | None = None) -> go.Figure:
+    """The lines of a chart in a window; dotted ones wait in the legend for a click."""
+    chart = theme.new(one.title, one.time, f"[{one.unit}]")
+    for each in of_window(one, window_s).lines:
+        x, y = line(each.time_s, each.values, theme.POINTS)
+        look = {"width": 1.4, "color": each.colour, "dash": each.dash}
+        seen = "legendonly" if each.dash == "dot" else True
+        chart.add_trace(
+            go.Scatter(x=x, y=y, mode="lines", name=plain(each.name), line=look, visible=seen, hovertemplate="%{y:.4g}")
+        )
+    if window_s is not None:
+        chart.update_xaxes(range=list(window_s))
+    return chart
 
 
 def spectrum(one: Lines, window_s: Window | None) -> go.Figure:
@@ -121,9 +162,9 @@ def spectrum(one: Lines, window_s: Window | None) -> go.Figure:
     for each, frequency, amplitude in found:
         peak = frequency[int(np.argmax(amplitude))]
         x, y = line(frequency, np.maximum(amplitude, _FLOOR * most), theme.POINTS)
-        name, drawn = f"{each.name}, largest at {peak:.4g} Hz", {"width": 1.3, "color": each.colour}
+        name, look = f"{each.name}, largest at {peak:.4g} Hz", {"width": 1.3, "color": each.colour, "dash": each.dash}
         hover = "%{x:.4g} Hz: %{y:.3g} " + plain(one.unit)
-        chart.add_trace(go.Scatter(x=x, y=y, mode="lines", name=plain(name), line=drawn, hovertemplate=hover))
+        chart.add_trace(go.Scatter(x=x, y=y, mode="lines", name=plain(name), line=look, hovertemplate=hover))
     chart.update_xaxes(type="log")
     chart.update_yaxes(type="log", exponentformat="power", nticks=7)
     return chart
@@ -139,10 +180,10 @@ def difference(one: Lines, window_s: Window | None) -> go.Figure:
     left = more.values[part] - np.interp(time_s, less.time_s, less.values, left=np.nan, right=np.nan)
     x, y = line(time_s, left, theme.POINTS)
     title = f"{one.title}: {more.name} − {less.name}"
-    chart = theme.new(title, "Time [s]", f"Δ [{one.unit}]")
+    chart = theme.new(title, one.time, f"Δ [{one.unit}]")
     rms = float(np.sqrt(np.nanmean(left**2))) if np.any(np.isfinite(left)) else np.nan
-    name, drawn = f"rms {rms:.4g} {one.unit}", {"width": 1.3, "color": DIFFERENCE}
-    chart.add_trace(go.Scatter(x=x, y=y, mode="lines", name=plain(name), line=drawn, showlegend=True))
+    name, look = f"rms {rms:.4g} {one.unit}", {"width": 1.3, "color": DIFFERENCE}
+    chart.add_trace(go.Scatter(x=x, y=y, mode="lines", name=plain(name), line=look, showlegend=True))
     chart.update_yaxes(exponentformat="power")
     if window_s is not None:
         chart.update_xaxes(range=list(window_s))

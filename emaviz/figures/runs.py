@@ -20,7 +20,8 @@ from ema_model.quantities.sides import MOTOR, USER, Side
 from ema_model.recordings import SIGNALS, Measurement
 from ema_model.text import COLOURS
 from emaviz.colours import COMMAND, DIFFERENCE, GHOST, MONITOR, PHASES, REFERENCE, RUNS
-from emaviz.figures.lines import POINTS, Lines, LiveLines, Window, lines, within
+from emaviz.figures.lines import POINTS, Lines, LiveLines, Window, of_window, within
+from emaviz.figures.overlays import recorded
 from emaviz.figures.theme import DARK, LIGHT, envelope, line, plain
 from emaviz.recording.entry import Entry, error_key, setting
 from emaviz.recording.read import Recording
@@ -103,7 +104,7 @@ class LiveSignals:
             named.append(("command", COMMAND, chart.scale * reference["command_rad"]))
         if ghost is not None:
             named.append(("frozen", GHOST, chart.scale * at(ghost, chart.signal, time_s)))
-        return lines(chart.title, chart.unit, time_s, *named, difference=(1, 0))
+        return Lines.of(chart.title, chart.unit, time_s, *named, difference=(1, 0))
 
     def show(
         self, reference: Measurement, monitor: Measurement, ghost: Measurement | None, window_s: Window | None
@@ -198,8 +199,8 @@ class LivePhases(LiveLines):
         )
         self.draw(
             [
-                lines("Phase currents", "A", time_s, *phases),
-                lines("Equivalent single-phase current", "A", time_s, *equivalent, difference=(2, 1)),
+                Lines.of("Phase currents", "A", time_s, *phases),
+                Lines.of("Equivalent single-phase current", "A", time_s, *equivalent, difference=(2, 1)),
             ]
         )
 
@@ -536,24 +537,22 @@ def signals(*recordings: Recording) -> list[str]:
     return [name for name in dict.fromkeys(sets[0]) if all(name in others for others in sets[1:]) and name in SIGNALS]
 
 
-def two_recordings(first: Recording, second: Recording, signal: str, *, dark: bool = False) -> go.Figure:
-    """Rows: the signal as recorded (thin) and fitted (bold), the residual, the best error of each iteration."""
+def two_recordings(
+    first: Recording, second: Recording, signal: str, *, window_s: Window | None = None, dark: bool = False
+) -> go.Figure:
+    """Rows: the signal as recorded (thin) and fitted (bold), the residual, the best error of each iteration.
+
+    window_s: the time that the upper two show, from–to; None: all.
+    """
     drawn = make_subplots(rows=3, cols=1, vertical_spacing=0.1, row_heights=[0.4, 0.28, 0.32])
     theme = DARK if dark else LIGHT
     traces = [trace for one in (first, second) for trace in one.identification.values()]
     corrected = all(trace.corrected is not None for trace in traces)  # an older file has none
+    for row, one in enumerate(recorded([("A", FIRST, first), ("B", SECOND, second)], signal), 1):
+        for each in of_window(one, window_s).lines:
+            width = 1.8 if row == 1 and each.dash == "solid" else 1.2
+            _add(drawn, row, each.time_s, each.values, each.name, each.colour, each.dash, width, listed=row == 1)
     for recording, colour, name in ((first, FIRST, "A"), (second, SECOND, "B")):
-        for group, width, dash, said in (
-            ("reference", 1.2, "dot", "recorded"),
-            ("measurement", 1.2, "dot", "recorded"),
-            ("monitor", 1.8, "solid", "fitted"),
-        ):
-            series = recording.signals.get(group, {}).get(signal)
-            if series is not None:
-                _add(drawn, 1, series.time_s, series.values, f"{name} {said}", colour, dash, width)
-        residual = recording.signals.get("residual", {}).get(signal)
-        if residual is not None:
-            _add(drawn, 2, residual.time_s, residual.values, f"{name} residual", colour, "solid", 1.2, listed=False)
         for place, (algorithm, trace) in enumerate(recording.identification.items()):
             said = plain(f"{name} {algorithm_title(algorithm)}")
             index, errors = trace.iteration, trace.rmse
@@ -566,6 +565,8 @@ def two_recordings(first: Recording, second: Recording, signal: str, *, dark: bo
     which = "Corrected" if corrected else "Uncorrected"
     drawn.update_yaxes(title_text=f"{which}<br>error [A]", type="log", row=3, col=1, **_LOG)
     drawn.update_xaxes(title_text="Time [s]", matches="x", row=2, col=1)
+    if window_s is not None:
+        drawn.update_xaxes(range=list(window_s), row=1, col=1)
     drawn.update_xaxes(title_text="Iteration", row=3, col=1)
     drawn.update_layout(
         template=theme.template(),

@@ -15,9 +15,11 @@ import viser
 from ema_model.errors import InputError
 from ema_model.faults import HEALTHY
 from ema_model.recordings import SIGNALS, Measurement
-from emaviz.figures import comparison, runs
+from emaviz.figures import comparison, overlays, runs
 from emaviz.figures.identification import named
+from emaviz.figures.lines import Lines, Window, clipped
 from emaviz.page.campaigns import CampaignControls
+from emaviz.page.measure import marked
 from emaviz.page.panel import recording_link
 from emaviz.page.tab import Shared, Tab
 from emaviz.page.window_layout import COLUMNS
@@ -144,6 +146,7 @@ class RunsResult:
     def __init__(self, page: Page, panel: viser.PanelHandle) -> None:
         self._page = page
         self._pair: tuple[tuple[Entry, Any], tuple[Entry, Any]] | None = None
+        self._window: Window | None = None  # of time, in which the pair is shown
         self._plot: Any = None
         self._told, self._drawn = _NOTHING, False  # of the chosen run
         self._opened, self._dark = ("", ""), False  # the viewer's address and recording; whether the page is dark
@@ -200,7 +203,7 @@ class RunsResult:
 
     def compare(self, first: tuple[Entry, Any], second: tuple[Entry, Any]) -> None:
         """Two recordings, each as an entry and what was read of it."""
-        self._pair = first, second
+        self._pair, self._window = (first, second), None
         names = runs.signals(first[1], second[1]) or ["current_A"]
         self._signals = {SIGNALS[name].title: name for name in names}
         titles = {name: title for title, name in self._signals.items()}
@@ -219,16 +222,32 @@ class RunsResult:
         self._draw()
         self._table.content = runs.two_recordings_table(first[0], second[0])
 
+    def _chosen(self) -> str:
+        return self._signals.get(str(self._signal.value), "current_A")
+
+    def _lines(self, place: int) -> Lines | None:
+        if self._pair is None:
+            return None
+        (_, first), (_, second) = self._pair
+        found = overlays.recorded([("A", runs.FIRST, first), ("B", runs.SECOND, second)], self._chosen())[place]
+        return found if found.lines else None
+
+    def _zoom(self, window_s: Window | None) -> None:
+        one = self._lines(0)
+        if one is not None:
+            self._window = clipped(window_s, one.every_time_s)
+            self._draw()
+
     def _draw(self) -> None:
         if self._pair is None:
             return
         (_, first), (_, second) = self._pair
-        figure = runs.two_recordings(first, second, self._signals.get(str(self._signal.value), "current_A"))
+        figure = runs.two_recordings(first, second, self._chosen(), window_s=self._window)
         if self._plot is None:
             with self._place:
                 self._plot = self._page.server.gui.add_plotly(figure, config=_CONFIG, aspect=1.1)
-        else:
-            self._plot.figure = figure
+            self._page.measuring.add_rows(self._plot, 2, self._lines, self._zoom)
+        self._plot.figure = marked(figure, self._plot, rows=2)
 
 
 def _hint(text: str) -> Html:

@@ -10,7 +10,7 @@ from collections.abc import Sequence
 
 from emaviz.colours import HELD_OUT, LIMIT, rgb
 from emaviz.figures.theme import DARK, LIGHT
-from emaviz.page import charts, window_layout
+from emaviz.page import charts, measure, window_layout
 from emaviz.text.html import Html, html, unescaped
 
 STRIP = Html('<div class="emaviz-strip"></div>')  # stands in the panel that becomes the strip
@@ -63,7 +63,7 @@ def page() -> Html:
         "{width:8.4em!important}"
         "</style>"
     )
-    return rules + _strip() + window_layout.style() + charts.style()
+    return rules + _strip() + window_layout.style() + charts.style() + measure.style()
 
 
 def _strip() -> Html:

@@ -14,6 +14,7 @@ import viser
 from ema_model.errors import InputError
 from emaviz.page import charts, window_layout
 from emaviz.page.charts import ChartHeights
+from emaviz.page.measure import Measuring
 from emaviz.page.style import unseen
 from emaviz.page.window_layout import Docked
 from emaviz.server.field_error import say_beside
@@ -291,6 +292,7 @@ class Page:
     session: Session
     screen: Worker  # draws, at a pace that browsers can follow
     workspaces: Workspaces  # which windows are where
+    measuring: Measuring  # of charts over time
     folder: Path | None = None  # of the data, whose files messages name without it
     _refused: set[str] = field(default_factory=set)  # controls beside which something is said
 

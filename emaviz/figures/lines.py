@@ -133,6 +133,11 @@ def of_window(one: Lines, window_s: Window | None) -> Lines:
     return Lines(one.title, one.unit, inside)
 
 
+def _seen(one: Line) -> bool | str:
+    """Dotted lines are told in the legend, where a click shows them."""
+    return "legendonly" if one.dash == "dot" else True
+
+
 def _said(window_s: Window | None) -> str:
     return "" if window_s is None else f", {window_s[0]:.4g} … {window_s[1]:.4g} s"
 
@@ -143,12 +148,8 @@ def drawn(one: Lines, window_s: Window | None = None) -> go.Figure:
     for each in of_window(one, window_s).lines:
         x, y = line(each.time_s, each.values, theme.POINTS)
         look = {"width": 1.4, "color": each.colour, "dash": each.dash}
-        seen = "legendonly" if each.dash == "dot" else True
-        chart.add_trace(
-            go.Scatter(x=x, y=y, mode="lines", name=plain(each.name), line=look, visible=seen, hovertemplate="%{y:.4g}")
-        )
-    if window_s is not None:
-        chart.update_xaxes(range=list(window_s))
+        more = {"hovertemplate": "%{y:.4g}", "visible": _seen(each)}
+        chart.add_trace(go.Scatter(x=x, y=y, mode="lines", name=plain(each.name), line=look, **more))
     return chart
 
 
@@ -163,8 +164,8 @@ def spectrum(one: Lines, window_s: Window | None) -> go.Figure:
         peak = frequency[int(np.argmax(amplitude))]
         x, y = line(frequency, np.maximum(amplitude, _FLOOR * most), theme.POINTS)
         name, look = f"{each.name}, largest at {peak:.4g} Hz", {"width": 1.3, "color": each.colour, "dash": each.dash}
-        hover = "%{x:.4g} Hz: %{y:.3g} " + plain(one.unit)
-        chart.add_trace(go.Scatter(x=x, y=y, mode="lines", name=plain(name), line=look, hovertemplate=hover))
+        hover = {"hovertemplate": "%{x:.4g} Hz: %{y:.3g} " + plain(one.unit), "visible": _seen(each)}
+        chart.add_trace(go.Scatter(x=x, y=y, mode="lines", name=plain(name), line=look, **hover))
     chart.update_xaxes(type="log")
     chart.update_yaxes(type="log", exponentformat="power", nticks=7)
     return chart

@@ -548,7 +548,8 @@ def two_recordings(
     theme = DARK if dark else LIGHT
     traces = [trace for one in (first, second) for trace in one.identification.values()]
     corrected = all(trace.corrected is not None for trace in traces)  # an older file has none
-    for row, one in enumerate(recorded([("A", FIRST, first), ("B", SECOND, second)], signal), 1):
+    over = recorded([("A", FIRST, first), ("B", SECOND, second)], signal)
+    for row, one in enumerate(over, 1):
         for each in of_window(one, window_s).lines:
             width = 1.8 if row == 1 and each.dash == "solid" else 1.2
             _add(drawn, row, each.time_s, each.values, each.name, each.colour, each.dash, width, listed=row == 1)
@@ -565,8 +566,9 @@ def two_recordings(
     which = "Corrected" if corrected else "Uncorrected"
     drawn.update_yaxes(title_text=f"{which}<br>error [A]", type="log", row=3, col=1, **_LOG)
     drawn.update_xaxes(title_text="Time [s]", matches="x", row=2, col=1)
-    if window_s is not None:
-        drawn.update_xaxes(range=list(window_s), row=1, col=1)
+    times = [one.every_time_s[[0, -1]] for one in over if one.lines]
+    if times:
+        drawn.update_xaxes(range=list(window_s or times[0]), row=1, col=1)
     drawn.update_xaxes(title_text="Iteration", row=3, col=1)
     drawn.update_layout(
         template=theme.template(),

@@ -328,7 +328,7 @@
   document.addEventListener('wheel', wheel, { ...on, passive: false });
   document.addEventListener('mouseover', offer, on);
   document.addEventListener('keydown', key, on);
-  window.emavizMeasure = { end: () => {
+  window.emavizMeasure = { cursors: () => [cursors.a, cursors.b], end: () => {
     heard.abort();
     clearInterval(timer);
     document.querySelectorAll('[class^=emaviz-measure]').forEach(one => one.remove());

@@ -111,7 +111,7 @@ class Measuring:
     def _event(self, group: _Group, place: int, _: Mapping[str, float]) -> dict[str, Any]:
         window = event_of([one for i in range(len(group.keys)) if (one := group.lines(i)) is not None])
         if window is None:
-            raise InputError("no event that begins and ends is found here: all is shown")
+            raise InputError("Nothing here begins and ends, as a step does: all is shown.")
         return self._zoom(group, place, {"from": window[0], "to": window[1]})
 
     def _spectrum(self, group: _Group, place: int, at: Mapping[str, float]) -> Any:

@@ -225,9 +225,11 @@ class ComparePlots:
                 moment_s=view.moment_s,
                 window_s=self._window,
             )
-        if self._window is not None:
-            figure.update_xaxes(range=list(self._window))
-        return figure if why_missing(figure) else marked(figure, self._time[place].handle)
+        if why_missing(figure):
+            return figure
+        times = self._every(view)[place].every_time_s[[0, -1]]
+        figure.update_xaxes(range=list(self._window or times))  # Plotly forgets nothing but what it is told anew
+        return marked(figure, self._time[place].handle)
 
     def _draw_against(self, view: View) -> go.Figure:
         variable = self._variables.get(str(self._variable.value), _FIRST)

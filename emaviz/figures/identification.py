@@ -103,7 +103,7 @@ def fault_bars(
     legend += html(" &nbsp;│ healthy")
     legend += html(" &nbsp;▒ below the detection limit") if detectable is not None else ""
     return html(
-        '<div style="padding:0 8px;font-size:12px"><table style="width:100%;border-collapse:collapse">'
+        '<div style="padding:0 8px;font-size:12px"><table class="faults" style="width:100%;border-collapse:collapse">'
         '{}</table><div style="opacity:.7;font-size:11px;padding-top:4px">{}</div></div>',
         joined(rows),
         legend,

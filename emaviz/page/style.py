@@ -35,6 +35,11 @@ def page() -> Html:
         "[data-dock-region=left] [data-dock-tab]{padding-left:3px!important;padding-right:3px!important;"
         "font-size:11.5px!important}[data-dock-region=left] [data-dock-tab] *{font-size:inherit!important}"
         "[data-dock-region=left] [data-dock-tab] > div:has(svg){display:none!important}"
+        # tabs stay in sight where what is below them scrolls
+        ".mantine-ScrollArea-content [data-dock-area],[data-dock-region=left] .mantine-ScrollArea-content "
+        "div:has(> div > div > div > [data-dock-area]){overflow:clip!important}"
+        ".mantine-ScrollArea-content [data-dock-strip]{position:sticky!important;top:0;z-index:4;"
+        "background:var(--mantine-color-body)}"
         # a slider's number in full: viser's box has room for five characters
         ".mantine-Slider-root ~ .mantine-NumberInput-root,"
         "div:has(> .mantine-Slider-root) + .mantine-NumberInput-root,"

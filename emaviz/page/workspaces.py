@@ -121,7 +121,7 @@ _SCRIPT = """
   const views = VIEWS, sizes = SIZES, titles = Object.fromEntries(views.map(v => [v.title, v]));
   window.emavizViews?.end();
   const asked = new URLSearchParams(location.search).get('view');
-  let wanted = views.some(v => v.name === asked) ? asked : FIRST, told = null, pressed = 0;
+  let wanted = views.some(v => v.name === asked) ? asked : FIRST, told = null, pressed = 0, at = null;
   const fitted = {}, passing = {};
   const tabs = () => [...document.querySelectorAll('[role=tab]')].filter(t => t.textContent.trim() in titles);
   const view = (tab) => titles[tab.textContent.trim()];
@@ -142,6 +142,7 @@ _SCRIPT = """
       return;
     }
     wanted = null;
+    at = front;
     if (now.name === told) return;
     told = now.name;
     window.emavizInset?.enter(now.inset, now.lower);
@@ -163,7 +164,10 @@ _SCRIPT = """
   };
   const seen = new MutationObserver(look);
   seen.observe(document.body, { subtree: true, attributes: true, attributeFilter: ['aria-selected'] });
-  const timer = setInterval(() => { if (told === null || wanted !== null) look(); }, 100);
+  const timer = setInterval(() => {
+    if (at && !at.isConnected) [wanted, at] = [told, null];  // a window that was narrow has its tabs anew, as at first
+    if (told === null || wanted !== null) look();
+  }, 100);
   const sizing = setInterval(fit, 250);
   window.emavizViews = {
     go: (name) => { wanted = name; look(); },
@@ -273,7 +277,7 @@ class Workspaces:
 
     def _fit_width(self, client: int, window_px: int) -> None:
         self._docked.fit(client, window_px)
-        self.heights.fit_width(client, window_px)
+        self.heights.fit_width(client, max(window_px, window_layout.LEAST_WIDTH_PX))
 
     def _left(self, client: viser.ClientHandle) -> None:
         self.heights.forget(client.client_id)

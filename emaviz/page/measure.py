@@ -27,7 +27,7 @@ HINT = "Drag or wheel: zoom. Click: cursors A and B. Double click: all."
 
 def hint() -> Html:
     """What a chart over time can do, in a line."""
-    return html('<div style="font-size:11.5px;padding:0 10px;line-height:1.4;opacity:.65">{}</div>', HINT)
+    return html('<div class="emaviz-measure-hint" title="{}">{}</div>', HINT, HINT)
 
 
 @dataclass(frozen=True, eq=False)

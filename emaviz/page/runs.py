@@ -272,6 +272,7 @@ class RunsPanel:
         self._page, self._viewer, self._recorded = page, viewer, recorded
         self._files, self._result = files, result
         self._by_hand = False  # chosen; else the newest is shown
+        self._growing = ""  # a run that is followed while it is being written
         self._seen: tuple[str, datetime] | None = None  # which is shown at a glance
         gui = page.server.gui
         self._choice: Any = gui.add_dropdown("Run", (NONE,))
@@ -321,9 +322,20 @@ class RunsPanel:
         self.refresh()
         self._open_chosen()
 
+    def follow(self, url: str, name: str) -> None:
+        """Shows a run while it is being written; the list has it from now on."""
+        self._growing, self._by_hand = name, True
+        self._choice.options = [name, *(one for one in self._recorded.names() if one != name)]
+        self._choice.value = name
+        self.refresh()
+        self._result.open(url, name)
+
     def refresh(self) -> None:
         """Reads the folder again."""
         names = self._recorded.names()
+        if self._viewer is None or self._growing in names or self._viewer.find_growing(self._growing) is None:
+            self._growing = ""
+        names = [*([self._growing] if self._growing else []), *names]
         if not self._by_hand or self._choice.value not in names:
             self._by_hand, chosen = False, (names or [NONE])[0]
         else:
@@ -360,10 +372,14 @@ class RunsPanel:
 
     def _show_chosen(self) -> None:
         name = str(self._choice.value)
-        exists = name != NONE
+        growing = bool(name) and name == self._growing
+        exists = name != NONE and not growing
         self._open.disabled = not exists or self._viewer is None
         self._rename.disabled = self._delete.disabled = not exists
         self._offer_others()
+        if growing:
+            self._card.content, self._link.content = _empty("It is being written; what it found comes at its end."), ""
+            return
         if not exists:
             self._card.content, self._link.content = _empty("None yet."), ""
             self._result.show(Html(), None)
@@ -527,6 +543,10 @@ class RunsTab(Tab):
         )
         for events in (shared.comparing.events, shared.discovering.events):
             events.kept.connect(lambda _: self.panel.refresh_soon())
+
+    def follow(self, url: str, name: str) -> None:
+        """Shows a run in the viewer while it is being written; from any thread."""
+        self.shared.files.post("follow", lambda: self.panel.follow(url, name))
 
     def takes(self) -> dict[str, Callable[[Path], None]]:
         """Sessions."""

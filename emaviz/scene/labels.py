@@ -294,6 +294,11 @@ class Labels:
             return
         self._sent[name] = (lines.tobytes(),)
         handle = self._lines.get(name)
+        if not len(lines):
+            if handle is not None:
+                handle.remove()
+            self._lines[name] = None
+            return
         if handle is None:
             self._lines[name] = self._scene.add_line_segments(
                 name, points=lines, colors=colour, thickness=thickness, thickness_units="screen"

@@ -144,6 +144,6 @@ def test_a_file_cut_in_the_middle_is_read_as_far_as_it_goes(written, tmp_path):
 
 def test_what_is_looked_at_first_stands_first(written):
     """A viewer shows what it has read so far."""
-    paths = [chunk.entity_path for chunk in RrdReader(written[0]).stream().to_chunks() if not chunk.is_static]
-    over_time = [path.startswith(("/reference", "/monitor", "/residual", "/measurement")) for path in paths]
+    chunks = [chunk for chunk in RrdReader(written[0]).stream().to_chunks() if not chunk.is_static]
+    over_time = ["iteration" not in chunk.timeline_names for chunk in chunks]
     assert over_time == sorted(over_time) and 0 < sum(over_time) < len(over_time)

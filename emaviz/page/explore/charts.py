@@ -61,7 +61,7 @@ class ChartsPanel:
             self._melt = gui.add_button("Remove the frozen run", icon=viser.Icon.X, color="gray", visible=False)
             self.signals = LiveSignals(gui, page.session.actuator.axes, page.workspaces.heights.set_axes)
             add_html(gui, hint())
-            page.workspaces.heights.add(self.signals.handles, spare_px=-16)
+            page.workspaces.heights.add(self.signals.handles, spare_px=-48)
         with panel.add_tab(PHASES, viser.Icon.WAVE_SINE):
             add_html(gui, TIME_CHARTS)
             self._phases = LivePhases(gui)

@@ -96,7 +96,7 @@ class LiveLines:
 
     def zoom(self, window_s: Window | None) -> None:
         """Draws this window from now on; None: all."""
-        self._window_s = clipped(window_s, self._drawn[0].lines[0].time_s) if self._drawn else None
+        self._window_s = clipped(window_s, self._drawn[0].lines[0].time_s) if self._drawn else window_s
         self._redraw()
 
     def draw(self, every: Sequence[Lines]) -> None:

@@ -165,7 +165,10 @@ _SCRIPT = """
   const seen = new MutationObserver(look);
   seen.observe(document.body, { subtree: true, attributes: true, attributeFilter: ['aria-selected'] });
   const timer = setInterval(() => {
-    if (at && !at.isConnected) [wanted, at] = [told, null];  // a window that was narrow has its tabs anew, as at first
+    if (at && !at.isConnected) {  // a window that was narrow, however shortly, has its tabs and panels anew, as at first
+      [wanted, at, fitted.innerWidth] = [told, null, sizes.innerWidth[0].px];
+      window.emavizPress(sizes.innerWidth[0].button);
+    }
     if (told === null || wanted !== null) look();
   }, 100);
   const sizing = setInterval(fit, 250);

@@ -39,7 +39,7 @@ def reading(time_s: Array, values: Array, from_s: float, to_s: float) -> Reading
     time_s, values = time_s[known], values[known]
     low, high = sorted((from_s, to_s))
     if len(time_s) < 2 or not time_s[0] <= low < high <= time_s[-1]:
-        return Reading(*(_at(time_s, values, one) for one in (low, high)), np.nan, np.nan, np.nan)
+        return Reading(_at(time_s, values, low), _at(time_s, values, high), np.nan, np.nan, np.nan)
     inside = (time_s > low) & (time_s < high)
     first, last = _at(time_s, values, low), _at(time_s, values, high)
     t = np.concatenate([[low], time_s[inside], [high]])
@@ -84,8 +84,9 @@ def spectrum(time_s: Array, values: Array) -> tuple[Array, Array]:
     x = np.arange(count) - 0.5 * (count - 1)
     y = y - np.mean(y) - x * (x @ y) / (x @ x)
     window = np.hanning(count + 1)[:-1]
-    amplitude = 2.0 * np.abs(np.fft.rfft(window * y)) / np.sum(window)
-    return np.fft.rfftfreq(count, step)[1:], amplitude[1:]
+    amplitude: Array = 2.0 * np.abs(np.fft.rfft(window * y)) / float(np.sum(window))
+    frequency: Array = np.arange(len(amplitude), dtype=np.float64) / (count * step)
+    return frequency[1:], amplitude[1:]
 
 
 # --- its event --------------------------------------------------------------------------------------------------------

@@ -633,7 +633,7 @@ class LiveFit(LiveLines):
             )
         left = [one - measured_A for one in fitted_A.values()]
         fitted = [(algorithm_title(name), colour(name), one) for name, one in fitted_A.items()]
-        apart = [(*named, one) for (*named, _), one in zip(fitted, left)]
+        apart = [(title, drawn, one) for (title, drawn, _), one in zip(fitted, left)]
         both = ("measured", REFERENCE, measured_A), *fitted
         self.draw(
             [
@@ -713,7 +713,7 @@ class LiveFan(LiveLines):
         self._legend.content = legend(*zip(SHADES, labels), (COMMAND, "command"))
         every = []
         for chart, handle in self._charts:
-            drawn = [(*of, chart.scale * one[chart.signal]) for *of, one in zip(labels, SHADES, runs)]
+            drawn = [(label, shade, chart.scale * one[chart.signal]) for label, shade, one in zip(labels, SHADES, runs)]
             if chart.with_command:
                 drawn.append(("command", COMMAND, chart.scale * runs[0]["command_rad"]))
             every.append(Lines.of(chart.title, chart.unit, runs[0].time_s, *drawn, difference=(len(runs) - 1, 0)))

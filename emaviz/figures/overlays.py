@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from ema_model.comparison.result import Compared, Comparison
 from ema_model.recordings import SIGNALS
 from ema_model.recordings.window import event
-from emaviz.colours import CASES
+from emaviz.colours import CASES, DIFFERENCE, MONITOR, REFERENCE
 from emaviz.figures import theme
 from emaviz.figures.comparison import of_residual, quantity_of_signal
 from emaviz.figures.lines import Line, Lines, Window
@@ -88,7 +88,10 @@ _RECORDED = ("reference", "dot"), ("measurement", "dot"), ("monitor", "solid")
 
 
 def recorded(named: Sequence[tuple[str, str, Recording]], signal: str) -> list[Lines]:
-    """A signal of recorded runs, and what is left of it; named: what each is called, and its colour."""
+    """A signal of recorded runs, and what is left of it; named: what each is called, and its colour, "" for usual ones.
+
+    The second is without lines where no run has a residual.
+    """
     over: list[Line] = []
     apart: list[Line] = []
     begins: list[int] = []  # of each run among the lines
@@ -98,12 +101,13 @@ def recorded(named: Sequence[tuple[str, str, Recording]], signal: str) -> list[L
         for group, dash in _RECORDED:
             series = one.signals.get(group, {}).get(signal)
             if series is not None:
-                said = "fitted" if group == "monitor" else "recorded"
-                over.append(Line(f"{name} {said}", colour, series.time_s, series.values, dash))
+                said, usual = ("fitted", MONITOR) if group == "monitor" else ("recorded", REFERENCE)
+                over.append(Line(f"{name} {said}".strip(), colour or usual, series.time_s, series.values, dash))
         left = one.signals.get("residual", {}).get(signal)
         if left is not None:
-            apart.append(Line(f"{name} residual", colour, left.time_s, left.values))
-    second = begins[-1] if 0 < begins[-1] < len(over) else None
+            apart.append(Line(f"{name} residual".strip(), colour or DIFFERENCE, left.time_s, left.values))
+    second = begins[-1] if len(named) > 1 else len(over) - 1  # of one run, its model
+    second = second if 0 < second < len(over) else None
     return [
         Lines(title, unit, over, (second, 0) if second is not None else None),
         Lines("Residual", unit, apart, (1, 0) if len(apart) > 1 else None),

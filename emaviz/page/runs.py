@@ -147,6 +147,7 @@ class RunsResult:
         self._page = page
         self._pair: tuple[tuple[Entry, Any], tuple[Entry, Any]] | None = None
         self._window: Window | None = None  # of time, in which the pair is shown
+        self._shown: Recording | None = None  # the chosen run
         self._plot: Any = None
         self._told, self._drawn = _NOTHING, False  # of the chosen run
         self._opened, self._dark = ("", ""), False  # the viewer's address and recording; whether the page is dark
@@ -163,6 +164,7 @@ class RunsResult:
             self._signal: Any = gui.add_dropdown("Signal", ("–",), visible=False)
             self._place = gui.add_folder("Signals and search", visible=False)
             self._table = add_html(gui)
+        page.measuring.add_rows(self._glance, 2, self._glance_lines, self._zoom_glance)
         self._close.on_click(lambda _: page.screen.post("viewer", self.close_viewer))
         self._signal.on_update(lambda event: event.client and page.screen.post("two", self._draw))
 
@@ -189,12 +191,29 @@ class RunsResult:
 
     def show(self, told: Html, recording: Recording | None) -> None:
         """The chosen run, where the viewer is not open: what is said of it, and its current; None for none."""
-        figure = comparison.one_recording(recording) if recording is not None else None
-        self._told, self._drawn = told or _NOTHING, figure is not None
-        if figure is not None:
-            self._glance.figure = figure
+        self._shown = recording
+        self._told, self._drawn = told or _NOTHING, self._draw_glance(None)
         if not self._close.visible:
             self._frame.content, self._glance.visible = self._told, self._drawn
+
+    def _draw_glance(self, window_s: Window | None) -> bool:
+        """Whether there is something to draw."""
+        figure = comparison.one_recording(self._shown, window_s=window_s) if self._shown is not None else None
+        if figure is not None:
+            self._glance.figure = marked(figure, self._glance, rows=2)
+        return figure is not None
+
+    def _glance_lines(self, place: int) -> Lines | None:
+        signal = comparison.signal_at_a_glance(self._shown) if self._shown is not None else None
+        if self._shown is None or signal is None:
+            return None
+        found = overlays.recorded([("", "", self._shown)], signal)[place]
+        return found if found.lines else None
+
+    def _zoom_glance(self, window_s: Window | None) -> None:
+        one = self._glance_lines(0)
+        if one is not None:
+            self._draw_glance(clipped(window_s, one.every_time_s))
 
     def close_viewer(self) -> None:
         """Takes the viewer off the page, which frees its memory."""

@@ -165,7 +165,7 @@ _SCRIPT = """
   const seen = new MutationObserver(look);
   seen.observe(document.body, { subtree: true, attributes: true, attributeFilter: ['aria-selected'] });
   const timer = setInterval(() => {
-    if (at && !at.isConnected) {  // a window that was narrow, however shortly, has its tabs and panels anew, as at first
+    if (at && !at.isConnected) {  // a window that was narrow, however shortly, has tabs and panels anew
       [wanted, at, fitted.innerWidth] = [told, null, sizes.innerWidth[0].px];
       window.emavizPress(sizes.innerWidth[0].button);
     }

@@ -319,6 +319,7 @@ class ResultPanel:
         self._time_s = 0.0  # where the clock stood when the plots were drawn last
         self._region: Region | None = None
         self._preview: Any = None
+        self._mapped: list[Lines] = []  # what the preview draws
         self._buttons: list[Any] = []
         gui = page.server.gui
         add_html(gui, COLUMNS)
@@ -359,19 +360,33 @@ class ResultPanel:
         said = "as its columns are read"
         self._lines.show(opened)
         try:
-            figure, aspect = comparison_figures.mapped_columns(opened.columns, opened.mapping)
+            self._mapped = comparison_figures.mapped_lines(opened.columns, opened.mapping)
         except InputError as error:
             said = "no table is found in it" if opened.problem else str(error)
             if self._preview is not None:
                 self._preview.visible = False
         else:
-            if self._preview is None:
-                with self._place:
-                    self._preview = self._page.server.gui.add_plotly(figure, config=_CONFIG, aspect=aspect)
-            self._preview.figure, self._preview.aspect, self._preview.visible = figure, aspect, True
+            self._draw_preview(None)
         self._headline.content = html("<div {}><b>{}</b>, {}</div>", _BOX, opened.path.name, said)
         self._place.visible = True
         self._show_answer(False)
+
+    def _draw_preview(self, window_s: Window | None) -> None:
+        times = self._mapped[0].lines[0].time_s
+        over_time = self._mapped[0].time == "Time [s]" and bool(np.all(np.diff(times) > 0.0))  # which NaN is not
+        window_s = clipped(window_s, times) if over_time else None
+        figure, aspect = comparison_figures.mapped_columns(self._mapped, window_s)
+        if self._preview is None:
+            with self._place:
+                self._preview = self._page.server.gui.add_plotly(figure, config=_CONFIG, aspect=aspect)
+        if over_time:
+            rows = len(self._mapped)
+            self._page.measuring.add_rows(self._preview, rows, self._mapped_at, self._draw_preview)
+            marked(figure, self._preview, rows)
+        self._preview.figure, self._preview.aspect, self._preview.visible = figure, aspect, True
+
+    def _mapped_at(self, place: int) -> Lines | None:
+        return self._mapped[place] if place < len(self._mapped) else None
 
     def end_preview(self) -> None:
         """Back to the comparison, if there is one."""

@@ -40,6 +40,9 @@ def page() -> Html:
         "div:has(> div > div > div > [data-dock-area]){overflow:clip!important}"
         ".mantine-ScrollArea-content [data-dock-strip]{position:sticky!important;top:0;z-index:4;"
         "background:var(--mantine-color-body)}"
+        # of which the upper edge of one within a result overlaps the control above it
+        "[data-dock-region=right] .mantine-ScrollArea-content [data-dock-strip]{top:-6px;"
+        "background:linear-gradient(transparent 6px,var(--mantine-color-body) 6px)}"
         # a slider's number in full: viser's box has room for five characters
         ".mantine-Slider-root ~ .mantine-NumberInput-root,"
         "div:has(> .mantine-Slider-root) + .mantine-NumberInput-root,"

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 import plotly.graph_objects as go
 from numpy.typing import NDArray
@@ -19,6 +21,8 @@ from ema_model.quantities.variables import MODULATORS, variable_title
 from ema_model.recordings import SIGNALS, ColumnMapping, Measurement, apply_mapping
 from emaviz.colours import BACKWARD, COMMAND, DIFFERENCE, FORWARD, MONITOR, REFERENCE
 from emaviz.figures import theme
+from emaviz.figures.lines import Line, Lines, Window
+from emaviz.figures.lines import within as inside
 from emaviz.figures.theme import DARK, LIGHT, Binned, band, binned, edges_for, envelope, line, scattered
 from emaviz.recording.read import Recording
 
@@ -529,31 +533,40 @@ _GROUPS = (
 )
 
 
-def one_recording(recording: Recording, *, dark: bool = False) -> go.Figure | None:
-    """Two rows on one time base; None for a recording without signals."""
+def signal_at_a_glance(recording: Recording) -> str | None:
+    """Which signal of a recording is shown; None where it has none."""
+    groups = [recording.signals.get(name, {}) for name, *_ in _GROUPS]
+    known = [signal for one in groups for signal in one if signal in SIGNALS]
+    return _FIRST if _FIRST in known else next(iter(known), None)
+
+
+def one_recording(recording: Recording, *, window_s: Window | None = None, dark: bool = False) -> go.Figure | None:
+    """Two rows on one time base; None for a recording without signals; window_s: the time to show, from–to."""
     groups = {name: recording.signals.get(name, {}) for name, *_ in _GROUPS}
-    known = [signal for one in groups.values() for signal in one if signal in SIGNALS]
-    if not known:
+    signal = signal_at_a_glance(recording)
+    if signal is None:
         return None
-    signal = _FIRST if _FIRST in known else known[0]
     left = recording.signals.get("residual", {}).get(signal)
     rows = 1 if left is None else 2
     drawn = make_subplots(rows=rows, cols=1, shared_xaxes=True, vertical_spacing=0.08)
     for name, said, colour, width in _GROUPS:
         series = groups[name].get(signal)
         if series is not None:
-            x, y = line(series.time_s, series.values, _ONE_RECORDING_POINTS)
+            part = inside(series.time_s, window_s)
+            x, y = line(series.time_s[part], series.values[part], _ONE_RECORDING_POINTS)
             look = {"color": colour, "width": width}
             drawn.add_trace(go.Scatter(x=x, y=y, name=said, mode="lines", line=look), row=1, col=1)
     title, unit = SIGNALS[signal].title, SIGNALS[signal].unit or "-"
     drawn.update_yaxes(title_text=f"{title}<br>[{unit}]", row=1, col=1)
     if left is not None:
-        x, y = line(left.time_s, left.values, _ONE_RECORDING_POINTS)
+        part = inside(left.time_s, window_s)
+        x, y = line(left.time_s[part], left.values[part], _ONE_RECORDING_POINTS)
         look = {"color": DIFFERENCE, "width": 1.3}
         drawn.add_trace(go.Scatter(x=x, y=y, name="residual", mode="lines", line=look), row=2, col=1)
         drawn.update_yaxes(title_text=f"Residual<br>[{unit}]", row=2, col=1)
         theme.cut(drawn, left.values, unit, row=2, col=1)
     drawn.update_xaxes(title_text="Time [s]", row=rows, col=1)
+    drawn.update_xaxes(range=list(window_s) if window_s is not None else None, autorange=window_s is None)
     drawn.update_layout(
         template=(DARK if dark else LIGHT).template(),
         margin={"l": 66, "r": 12, "t": 34, "b": 40},
@@ -569,28 +582,43 @@ _ROW_PX = 92
 _WIDTH_PX = 520
 
 
-def mapped_columns(columns: dict[str, np.ndarray], mapping: ColumnMapping) -> tuple[go.Figure, float]:
-    """The figure and its height over its width; `columns` as they stand in the file, (n,) each.
+def mapped_lines(columns: dict[str, np.ndarray], mapping: ColumnMapping) -> list[Lines]:
+    """Each signal as it would be read, against time or, without one, its samples; `columns` as in the file, (n,) each.
 
-    Values that are no numbers leave gaps.  InputError if the mapping does not fit the columns.
+    InputError if the mapping does not fit the columns.
     """
     signals, _ = apply_mapping(columns, mapping)
     time = signals.pop("time_s", None)
     if not signals:
         raise InputError("no column is used yet; say which column is which signal")
-    rows = len(signals)
+    found = []
+    for name, values in signals.items():
+        x = np.arange(float(len(values))) if time is None else time
+        colour = COMMAND if name.startswith("command") else REFERENCE
+        signal = SIGNALS[name]
+        line = Line(signal.title, colour, x, values)
+        found.append(Lines(signal.title, signal.unit or "", [line], time="Sample" if time is None else "Time [s]"))
+    return found
+
+
+def mapped_columns(every: Sequence[Lines], window_s: Window | None = None) -> tuple[go.Figure, float]:
+    """The figure and its height over its width; window_s: the time to show, from–to.
+
+    Values that are no numbers leave gaps.
+    """
+    rows = len(every)
     chart = make_subplots(rows=rows, cols=1, shared_xaxes=True, vertical_spacing=0.26 / max(rows, 2))
     titles = []
-    for row, (name, values) in enumerate(signals.items(), start=1):
-        x = np.arange(float(len(values))) if time is None else time
-        at, drawn = envelope(x, [values], _MAPPED_COLUMNS_POINTS)
-        colour = COMMAND if name.startswith("command") else REFERENCE
-        chart.add_trace(go.Scatter(x=at, y=drawn, mode="lines", line={"width": 1, "color": colour}), row=row, col=1)
-        signal = SIGNALS[name]
-        unit = f" [{signal.unit}]" if signal.unit else ""
+    for row, one in enumerate(every, start=1):
+        (each,) = one.lines
+        part = inside(each.time_s, window_s)
+        at, drawn = envelope(each.time_s[part], [each.values[part]], _MAPPED_COLUMNS_POINTS)
+        look = {"width": 1, "color": each.colour}
+        chart.add_trace(go.Scatter(x=at, y=drawn, mode="lines", line=look), row=row, col=1)
+        unit = f" [{one.unit}]" if one.unit else ""
         titles.append(
             {
-                "text": f"<b>{signal.title}</b>{unit}",
+                "text": f"<b>{one.title}</b>{unit}",
                 "xref": "paper",
                 "yref": f"y{row if row > 1 else ''} domain",
                 "x": 0.0,
@@ -603,7 +631,8 @@ def mapped_columns(columns: dict[str, np.ndarray], mapping: ColumnMapping) -> tu
         )
     chart.update_yaxes(nticks=4, gridcolor="#86868640", zeroline=False, tickfont={"size": 10})
     chart.update_xaxes(gridcolor="#86868640", zeroline=False, tickfont={"size": 10})
-    chart.update_xaxes(title={"text": "Time [s]" if time is not None else "Sample", "font": {"size": 11}}, row=rows)
+    chart.update_xaxes(title={"text": every[0].time, "font": {"size": 11}}, row=rows)
+    chart.update_xaxes(range=list(window_s) if window_s is not None else None, autorange=window_s is None)
     chart.update_layout(
         annotations=titles,
         showlegend=False,

@@ -31,6 +31,7 @@ from ema_model.quantities.variables import of_variable, variable_title
 from ema_model.simulation.with_effect import SHOWN, WithEffect, few_periods
 from emaviz.colours import DIFFERENCE, FITTED, HELD_OUT, MONITOR, REFERENCE
 from emaviz.figures import theme
+from emaviz.figures.lines import Lines, LiveLines
 from emaviz.figures.runs import LAST_MORE_PX, PLANT_LINE, charts, legend, time_axis, value_axis
 from emaviz.figures.theme import Binned, Series, binned, chart, edges_for, envelope, line, scattered, svg_number
 from emaviz.text.html import Html, add_html, html, joined, mathml
@@ -452,14 +453,15 @@ def _add_left(chart: go.Figure, left: Binned, axis: Quantity, shown: Quantity) -
 
 # --- what an effect does to a run: live charts with and without it, and a small picture for a card --------------------
 
-_EFFECT_SIGNATURE_POINTS, _SMALL_POINTS = 800, 160
+_SMALL_POINTS = 160
 _WIDTH, _HEIGHT = 120, 44  # of a small picture, pixels
 
 
-class EffectCharts:
+class EffectCharts(LiveLines):
     """A chart for each signal, and one of what changes in it; unseen until there is a run."""
 
     def __init__(self, gui: viser.GuiApi, axes: Axes, height: int = 92) -> None:
+        super().__init__()
         empty = np.array([0.0, 1.0])
         lines = legend((REFERENCE, "without"), (MONITOR, "with the effect"), (DIFFERENCE, "difference, below"))
         self._legend = add_html(gui, lines, visible=False)
@@ -468,35 +470,35 @@ class EffectCharts:
             last = shown.signal == SHOWN[-1]
             both = gui.add_uplot(
                 data=(empty, empty, empty),
-                series=({}, PLANT_LINE, _effect_signature_line("with", MONITOR, 1.5)),
+                series=({"label": "t [s]"}, PLANT_LINE, _effect_signature_line("with", MONITOR, 1.5)),
                 title=shown.title,
                 axes=(time_axis(False), value_axis(shown.unit)),
                 **_layout(height),
             )
             change = gui.add_uplot(
                 data=(empty, empty),
-                series=({}, _effect_signature_line("difference", DIFFERENCE, 1.5)),
+                series=({"label": "t [s]"}, _effect_signature_line("difference", DIFFERENCE, 1.5)),
                 title="",
                 axes=(time_axis(last), value_axis(shown.difference_unit)),
                 # its topmost number has no title above it
                 **_layout(height - 10 + (LAST_MORE_PX if last else 0), above=8),
             )
             self._charts.append((shown, both, change))
-
-    @property
-    def handles(self) -> list[Any]:
-        """The charts, from above."""
-        return [handle for _, *both in self._charts for handle in both]
+            self.handles += [both, change]
 
     def show(self, felt: WithEffect) -> None:
         """Draws a run."""
         time = felt.with_it.time_s
         self._legend.visible = True
+        every = []
         for of, both, change in self._charts:
             with_it, without = felt.with_it[of.signal], felt.without[of.signal]
-            both.data = envelope(time, [of.scale * without, of.scale * with_it], _EFFECT_SIGNATURE_POINTS)
+            two = ("without", REFERENCE, of.scale * without), ("with the effect", MONITOR, of.scale * with_it)
+            apart = "difference", DIFFERENCE, of.difference_scale * (with_it - without)
+            every.append(Lines.of(of.title, of.unit, time, *two, difference=(1, 0)))
+            every.append(Lines.of(f"{of.title}, difference", of.difference_unit, time, apart))
             both.visible = change.visible = True
-            change.data = envelope(time, [of.difference_scale * (with_it - without)], _EFFECT_SIGNATURE_POINTS)
+        self.draw(every)
 
 
 def _effect_signature_line(label: str, colour: str, width: float) -> Any:

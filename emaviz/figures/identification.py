@@ -22,19 +22,19 @@ from ema_model.recordings import Measurement
 from emaviz.colours import ALGORITHMS, COMMAND, DIFFERENCE, FAULT, MONITOR, REFERENCE, TRUTH
 from emaviz.colours import MONITOR_SHADES as SHADES
 from emaviz.figures import theme
+from emaviz.figures.lines import Lines, LiveLines
 from emaviz.figures.runs import (
     AXIS,
     CURSOR,
     LAST_MORE_PX,
     PADDING,
     PLANT_LINE,
-    POINTS,
     charts,
     legend,
     time_axis,
     value_axis,
 )
-from emaviz.figures.theme import envelope, line
+from emaviz.figures.theme import line
 from emaviz.text.html import Html, add_html, html, html_escape, joined, unescaped
 
 # --- k1…k8 as dots with whiskers about the healthy value, in HTML that the app and reports share ----------------------
@@ -103,7 +103,7 @@ def fault_bars(
     legend += html(" &nbsp;│ healthy")
     legend += html(" &nbsp;▒ below the detection limit") if detectable is not None else ""
     return html(
-        '<div style="padding:0 8px;font-size:12px"><table style="width:100%;border-collapse:collapse">'
+        '<div style="padding:0 8px;font-size:12px"><table class="faults" style="width:100%;border-collapse:collapse">'
         '{}</table><div style="opacity:.7;font-size:11px;padding-top:4px">{}</div></div>',
         joined(rows),
         legend,
@@ -574,10 +574,11 @@ def _fitted_current_scales(end: float | None) -> dict[str, Any]:
 MEASURED: Any = {**PLANT_LINE, "label": "measured"}
 
 
-class LiveFit:
+class LiveFit(LiveLines):
     """Two charts on one time base: the currents, and monitor − measured, whose axis a start does not set."""
 
     def __init__(self, gui: viser.GuiApi, height: int = 171) -> None:
+        super().__init__()
         empty = np.array([0.0, 1.0])
         self._algorithms: tuple[str, ...] = ()
         self._legend: Any = add_html(gui)
@@ -625,15 +626,21 @@ class LiveFit:
                 MEASURED,
                 *(_fitted_current_line(name, drawn) for name, drawn in names),
             )
-            lines = names if len(names) > 1 else [(names[0][0], DIFFERENCE)]
-            self._left.series = ({"label": "t [s]"}, *(_fitted_current_line(name, drawn) for name, drawn in lines))
+            apart = names if len(names) > 1 else [(names[0][0], DIFFERENCE)]
+            self._left.series = ({"label": "t [s]"}, *(_fitted_current_line(name, drawn) for name, drawn in apart))
             self._legend.content = legend(
                 (REFERENCE, "measured"), *((drawn, algorithm_title(name)) for name, drawn in names)
             )
-        fitted = list(fitted_A.values())
-        self._currents.data = envelope(time_s, [measured_A, *fitted], POINTS)
-        left = [one - measured_A for one in fitted]
-        self._left.data = envelope(time_s, left, POINTS)
+        left = [one - measured_A for one in fitted_A.values()]
+        fitted = [(algorithm_title(name), colour(name), one) for name, one in fitted_A.items()]
+        apart = [(title, drawn, one) for (title, drawn, _), one in zip(fitted, left)]
+        both = ("measured", REFERENCE, measured_A), *fitted
+        self.draw(
+            [
+                Lines.of("Measured and fitted current", "A", time_s, *both, difference=(1, 0)),
+                Lines.of(_FITTED_CURRENT_LEFT, "A", time_s, *apart),
+            ]
+        )
         end = theme.end_of(left)
         title = _FITTED_CURRENT_LEFT if end is None else f"{_FITTED_CURRENT_LEFT}, {theme.cut_note(end, left, 'A')}"
         if title != self._left.title:
@@ -670,10 +677,11 @@ def _add(chart: go.Figure, time, values, name: str, colour: str) -> None:
 _SHOWN = ("current_A", "user_position_rad", "motor_speed_rad_s")
 
 
-class LiveFan:
+class LiveFan(LiveLines):
     """Charts in a panel of the page; empty, and unseen, until there is a fan."""
 
     def __init__(self, gui: viser.GuiApi, axes: Axes, height: int = 155) -> None:
+        super().__init__()
         self._legend: Any = add_html(gui)
         self._charts: list[tuple[Any, Any]] = []
         empty, shown = np.array([0.0, 1.0]), [one for one in charts(axes) if one.signal in _SHOWN]
@@ -703,15 +711,17 @@ class LiveFan:
     def show(self, labels: Sequence[str], runs: Sequence[Measurement]) -> None:
         """labels: what each run is; both from the mildest to the worst, five."""
         self._legend.content = legend(*zip(SHADES, labels), (COMMAND, "command"))
+        every = []
         for chart, handle in self._charts:
-            lines = [chart.scale * one[chart.signal] for one in runs]
+            drawn = [(label, shade, chart.scale * one[chart.signal]) for label, shade, one in zip(labels, SHADES, runs)]
             if chart.with_command:
-                lines.append(chart.scale * runs[0]["command_rad"])
+                drawn.append(("command", COMMAND, chart.scale * runs[0]["command_rad"]))
+            every.append(Lines.of(chart.title, chart.unit, runs[0].time_s, *drawn, difference=(len(runs) - 1, 0)))
             named = [_fan_line(label, shade) for label, shade in zip(labels, SHADES)]
             if [one.get("label") for one in handle.series[1 : 1 + len(named)]] != list(labels):
                 handle.series = (handle.series[0], *named, *handle.series[1 + len(named) :])
-            handle.data = envelope(runs[0].time_s, lines, POINTS)
             handle.visible = True
+        self.draw(every)
 
 
 def _fan_line(label: str, colour: str) -> Any:

@@ -20,6 +20,8 @@ from ema_model.quantities.sides import MOTOR, USER, Side
 from ema_model.recordings import SIGNALS, Measurement
 from ema_model.text import COLOURS
 from emaviz.colours import COMMAND, DIFFERENCE, GHOST, MONITOR, PHASES, REFERENCE, RUNS
+from emaviz.figures.lines import POINTS, Lines, LiveLines, Window, of_window, within
+from emaviz.figures.overlays import recorded
 from emaviz.figures.theme import DARK, LIGHT, envelope, line, plain
 from emaviz.recording.entry import Entry, error_key, setting
 from emaviz.recording.read import Recording
@@ -28,7 +30,6 @@ from emaviz.text.html import Html, add_html, html, joined
 # --- the live charts of one run: reference, monitor, a frozen run, and the difference on an axis of its own -----------
 
 Array = NDArray[np.float64]
-POINTS = 800  # of a line, at most
 PADDING = (10, 4, 0, 0)  # top, right, bottom, left, px: the uppermost tick needs half a line
 _GREY = "#868e96"
 _VALUES_PX, _LABEL_PX = 22, 16  # of a time axis
@@ -65,6 +66,7 @@ class LiveSignals:
         empty = np.array([0.0, 1.0])
         self._legend: Any = add_html(gui, legend(*_SHOWN))
         self._frozen = False
+        self._runs: tuple[Measurement, Measurement, Measurement | None] | None = None
         self._charts: list[tuple[SignalChart, Any]] = []
         every = charts(axes)
         for chart in every:
@@ -88,14 +90,31 @@ class LiveSignals:
         """The charts, from above."""
         return [handle for _, handle in self._charts]
 
+    def lines(self, place: int) -> Lines | None:
+        """What a chart draws, whole; None before there is a run."""
+        if self._runs is None:
+            return None
+        chart, (reference, monitor, ghost) = self._charts[place][0], self._runs
+        time_s = reference.time_s
+        named = [
+            ("plant", REFERENCE, chart.scale * reference[chart.signal]),
+            ("monitor", MONITOR, chart.scale * monitor[chart.signal]),
+        ]
+        if chart.with_command:
+            named.append(("command", COMMAND, chart.scale * reference["command_rad"]))
+        if ghost is not None:
+            named.append(("frozen", GHOST, chart.scale * at(ghost, chart.signal, time_s)))
+        return Lines.of(chart.title, chart.unit, time_s, *named, difference=(1, 0))
+
     def show(
-        self, reference: Measurement, monitor: Measurement, ghost: Measurement | None, window_s: tuple[float, float]
+        self, reference: Measurement, monitor: Measurement, ghost: Measurement | None, window_s: Window | None
     ) -> None:
-        """Draws a run of both models on one time base, and the frozen one, from and to these times."""
+        """Draws a run of both models on one time base, and the frozen one, from and to these times; None: all."""
+        self._runs = reference, monitor, ghost
         if self._frozen != (ghost is not None):
             self._frozen = ghost is not None
             self._legend.content = legend(*_SHOWN, *([(GHOST, "frozen")] if self._frozen else []))
-        shown = _within(reference.time_s, window_s)
+        shown = within(reference.time_s, window_s)
         time = reference.time_s[shown]
         for i, (chart, handle) in enumerate(self._charts):
             rm, mm = reference[chart.signal][shown], monitor[chart.signal][shown]
@@ -106,11 +125,11 @@ class LiveSignals:
                 self._set_axes(handle, _axes(chart, i == len(self._charts) - 1))
             difference = chart.difference_scale * (mm - rm)
             frozen = beneath(at(ghost, chart.signal, time), rm)
-            lines = [difference, chart.scale * frozen, chart.scale * rm, chart.scale * mm]
+            every = [difference, chart.scale * frozen, chart.scale * rm, chart.scale * mm]
             if chart.with_command:
-                lines.append(chart.scale * reference["command_rad"][shown])
+                every.append(chart.scale * reference["command_rad"][shown])
             # in the middle third of the chart, so that it does not cover the signals
-            drawn = envelope(time, lines, POINTS)
+            drawn = envelope(time, every, POINTS)
             most = _FRAME * max(float(np.max(np.abs(difference))), 1e-6)
             frame = np.full(len(drawn[0]), most)
             frame[0] = -most
@@ -120,10 +139,11 @@ class LiveSignals:
 _EQUIVALENT = ((REFERENCE, "equivalent current of the phases, plant"), (MONITOR, "monitor"))
 
 
-class LivePhases:
+class LivePhases(LiveLines):
     """Phase currents, and the equivalent current that they make."""
 
     def __init__(self, gui: viser.GuiApi, height: int = 279) -> None:
+        super().__init__()
         empty = np.array([0.0, 1.0])
         add_html(gui, legend(*((colour, f"phase {name}, plant") for colour, name in zip(PHASES, "ABC"))))
         common = {
@@ -157,19 +177,32 @@ class LivePhases:
         )
         self.handles = [self._phases, self._equivalent]
 
-    def show(
-        self, reference: Measurement, monitor: Measurement, ghost: Measurement | None, window_s: tuple[float, float]
-    ) -> None:
-        """As `LiveSignals.show`."""
+    def lines(self, place: int) -> Lines | None:
+        """Without a frozen run, its line lies unseen beneath the plant's."""
+        found = super().lines(place)
+        if found is None or self._frozen or place == 0:
+            return found
+        return replace(found, lines=found.lines[1:], difference=(1, 0))
+
+    def show(self, reference: Measurement, monitor: Measurement, ghost: Measurement | None) -> None:
+        """Both models on one time base, and the frozen run."""
         if self._frozen != (ghost is not None):
             self._frozen = ghost is not None
             self._legend.content = legend(*_EQUIVALENT, *([(GHOST, "frozen")] if self._frozen else []))
-        shown = _within(reference.time_s, window_s)
-        time = reference.time_s[shown]
-        self._phases.data = envelope(time, [reference[name][shown] for name in PHASE_SIGNALS], POINTS)
-        current = reference["current_A"][shown]
-        lines = [beneath(at(ghost, "current_A", time), current), current, monitor["current_A"][shown]]
-        self._equivalent.data = envelope(time, lines, POINTS)
+        time_s, current = reference.time_s, reference["current_A"]
+        frozen = beneath(at(ghost, "current_A", time_s), current)
+        phases = ((f"phase {name}", colour, reference[of]) for name, colour, of in zip("ABC", PHASES, PHASE_SIGNALS))
+        equivalent = (
+            ("frozen", GHOST, frozen),
+            ("plant", REFERENCE, current),
+            ("monitor", MONITOR, monitor["current_A"]),
+        )
+        self.draw(
+            [
+                Lines.of("Phase currents", "A", time_s, *phases),
+                Lines.of("Equivalent single-phase current", "A", time_s, *equivalent, difference=(2, 1)),
+            ]
+        )
 
 
 def at(run: Measurement | None, signal: str, time_s: Array) -> Array:
@@ -184,7 +217,7 @@ def beneath(frozen: Array, shown: Array) -> Array:
     return np.where(np.isfinite(frozen), frozen, shown)
 
 
-# A drag would zoom one chart alone; the window of time above the charts zooms all of them, in full resolution.
+# A drag of uPlot's own would zoom what is drawn; `emaviz.page.measure` zooms all charts, in full resolution.
 CURSOR: Any = {"sync": {"key": "time"}, "drag": {"x": False, "y": False}}
 
 
@@ -243,14 +276,6 @@ def _series(chart: SignalChart) -> Any:
     # unseen; it sets the range of the difference's axis, which viser cannot change without a new chart
     series.append({**_line("range", "#00000000"), "width": 0, "scale": "difference"})
     return tuple(series)
-
-
-def _within(time_s: Array, window_s: tuple[float, float]) -> slice:
-    """The samples of a window; two at least."""
-    first = int(np.searchsorted(time_s, window_s[0] - 1e-9))
-    last = int(np.searchsorted(time_s, window_s[1] + 1e-9, side="right"))
-    first = min(first, len(time_s) - 2)
-    return slice(first, max(last, first + 2))
 
 
 # --- which signals of a run have a chart, and in which units ----------------------------------------------------------
@@ -512,24 +537,23 @@ def signals(*recordings: Recording) -> list[str]:
     return [name for name in dict.fromkeys(sets[0]) if all(name in others for others in sets[1:]) and name in SIGNALS]
 
 
-def two_recordings(first: Recording, second: Recording, signal: str, *, dark: bool = False) -> go.Figure:
-    """Rows: the signal as recorded (thin) and fitted (bold), the residual, the best error of each iteration."""
+def two_recordings(
+    first: Recording, second: Recording, signal: str, *, window_s: Window | None = None, dark: bool = False
+) -> go.Figure:
+    """Rows: the signal as recorded (thin) and fitted (bold), the residual, the best error of each iteration.
+
+    window_s: the time that the upper two show, from–to; None: all.
+    """
     drawn = make_subplots(rows=3, cols=1, vertical_spacing=0.1, row_heights=[0.4, 0.28, 0.32])
     theme = DARK if dark else LIGHT
     traces = [trace for one in (first, second) for trace in one.identification.values()]
     corrected = all(trace.corrected is not None for trace in traces)  # an older file has none
+    over = recorded([("A", FIRST, first), ("B", SECOND, second)], signal)
+    for row, one in enumerate(over, 1):
+        for each in of_window(one, window_s).lines:
+            width = 1.8 if row == 1 and each.dash == "solid" else 1.2
+            _add(drawn, row, each.time_s, each.values, each.name, each.colour, each.dash, width, listed=row == 1)
     for recording, colour, name in ((first, FIRST, "A"), (second, SECOND, "B")):
-        for group, width, dash, said in (
-            ("reference", 1.2, "dot", "recorded"),
-            ("measurement", 1.2, "dot", "recorded"),
-            ("monitor", 1.8, "solid", "fitted"),
-        ):
-            series = recording.signals.get(group, {}).get(signal)
-            if series is not None:
-                _add(drawn, 1, series.time_s, series.values, f"{name} {said}", colour, dash, width)
-        residual = recording.signals.get("residual", {}).get(signal)
-        if residual is not None:
-            _add(drawn, 2, residual.time_s, residual.values, f"{name} residual", colour, "solid", 1.2, listed=False)
         for place, (algorithm, trace) in enumerate(recording.identification.items()):
             said = plain(f"{name} {algorithm_title(algorithm)}")
             index, errors = trace.iteration, trace.rmse
@@ -542,6 +566,9 @@ def two_recordings(first: Recording, second: Recording, signal: str, *, dark: bo
     which = "Corrected" if corrected else "Uncorrected"
     drawn.update_yaxes(title_text=f"{which}<br>error [A]", type="log", row=3, col=1, **_LOG)
     drawn.update_xaxes(title_text="Time [s]", matches="x", row=2, col=1)
+    times = [one.every_time_s[[0, -1]] for one in over if one.lines]
+    if times:
+        drawn.update_xaxes(range=list(window_s or times[0]), row=1, col=1)
     drawn.update_xaxes(title_text="Iteration", row=3, col=1)
     drawn.update_layout(
         template=theme.template(),

@@ -20,6 +20,7 @@ from ema_model.simulation import plant
 from emaviz.page import compare, explore
 from emaviz.page.charts import add_chart_tools
 from emaviz.page.explore.tab import ExploreTab
+from emaviz.page.measure import Measuring, add_measuring
 from emaviz.page.panel import follow_theme
 from emaviz.page.playback import PlaybackStrip
 from emaviz.page.tab import AnyTab, Shared, Standings, Tab
@@ -130,8 +131,14 @@ class App:
         given = [data.take_in(file) for file in files]
         recordings = data.recordings
         self.viewer: ViewerHost | None = None
+        self.measuring = Measuring(lambda kind, job: self.screen.post(kind, job))
         self.server = open_server(
-            host, port, self.door, lambda: self.viewer.address if self.viewer else None, data.scene
+            host,
+            port,
+            self.door,
+            lambda: self.viewer.address if self.viewer else None,
+            data.scene,
+            self.measuring.answer,
         )
         self.viewer, no_viewer = _viewer(recordings)
         self.session = Session(actuator, recordings)
@@ -141,7 +148,7 @@ class App:
         self._docked = Docked(self.server)
         first = compare.WORKSPACE if given else explore.WORKSPACE
         self.workspaces = Workspaces(self.server, self.screen, self._docked, first.name)
-        self.page = Page(self.server, self.session, self.screen, self.workspaces, data.folder)
+        self.page = Page(self.server, self.session, self.screen, self.workspaces, self.measuring, data.folder)
         self.standings = Standings(self.screen, self.workspaces)
         self.comparing = Comparing(self.session, data)
         self.session.open_file, self.session.version_of = self.comparing.measurement, self.comparing.version
@@ -196,6 +203,7 @@ class App:
         self.page.workspaces.entered.connect(self.shared.enter)
         self.shared.uploads.add_drop(",".join(self.shared.taken()))
         add_chart_tools(Inside(self.server))
+        add_measuring(Inside(self.server))
         follow_theme(Inside(self.server))
         undo = self.tab(ExploreTab).panel.undo
         add_keys(self.page, self.strip, [kind.workspace for kind in kinds], undo)

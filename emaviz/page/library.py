@@ -50,6 +50,7 @@ class EffectPage:
         add_html(gui, NEXT_COLUMN)  # a signal and its difference stay together
         self._status = add_html(gui)
         self._charts = EffectCharts(gui, page.session.actuator.axes)
+        page.measuring.add(self._charts.handles, self._charts.lines, self._charts.zoom)
         page.workspaces.heights.add(self._charts.handles)
         page.workspaces.entered.connect(self._enter)
         self._run.on_update(lambda event: event.client and self._ask())

@@ -15,9 +15,11 @@ import viser
 from ema_model.errors import InputError
 from ema_model.faults import HEALTHY
 from ema_model.recordings import SIGNALS, Measurement
-from emaviz.figures import comparison, runs
+from emaviz.figures import comparison, overlays, runs
 from emaviz.figures.identification import named
+from emaviz.figures.lines import Lines, Window, clipped
 from emaviz.page.campaigns import CampaignControls
+from emaviz.page.measure import marked
 from emaviz.page.panel import recording_link
 from emaviz.page.tab import Shared, Tab
 from emaviz.page.window_layout import COLUMNS
@@ -144,6 +146,8 @@ class RunsResult:
     def __init__(self, page: Page, panel: viser.PanelHandle) -> None:
         self._page = page
         self._pair: tuple[tuple[Entry, Any], tuple[Entry, Any]] | None = None
+        self._window: Window | None = None  # of time, in which the pair is shown
+        self._shown: Recording | None = None  # the chosen run
         self._plot: Any = None
         self._told, self._drawn = _NOTHING, False  # of the chosen run
         self._opened, self._dark = ("", ""), False  # the viewer's address and recording; whether the page is dark
@@ -160,6 +164,7 @@ class RunsResult:
             self._signal: Any = gui.add_dropdown("Signal", ("–",), visible=False)
             self._place = gui.add_folder("Signals and search", visible=False)
             self._table = add_html(gui)
+        page.measuring.add_rows(self._glance, 2, self._glance_lines, self._zoom_glance)
         self._close.on_click(lambda _: page.screen.post("viewer", self.close_viewer))
         self._signal.on_update(lambda event: event.client and page.screen.post("two", self._draw))
 
@@ -186,12 +191,29 @@ class RunsResult:
 
     def show(self, told: Html, recording: Recording | None) -> None:
         """The chosen run, where the viewer is not open: what is said of it, and its current; None for none."""
-        figure = comparison.one_recording(recording) if recording is not None else None
-        self._told, self._drawn = told or _NOTHING, figure is not None
-        if figure is not None:
-            self._glance.figure = figure
+        self._shown = recording
+        self._told, self._drawn = told or _NOTHING, self._draw_glance(None)
         if not self._close.visible:
             self._frame.content, self._glance.visible = self._told, self._drawn
+
+    def _draw_glance(self, window_s: Window | None) -> bool:
+        """Whether there is something to draw."""
+        figure = comparison.one_recording(self._shown, window_s=window_s) if self._shown is not None else None
+        if figure is not None:
+            self._glance.figure = marked(figure, self._glance, rows=2)
+        return figure is not None
+
+    def _glance_lines(self, place: int) -> Lines | None:
+        signal = comparison.signal_at_a_glance(self._shown) if self._shown is not None else None
+        if self._shown is None or signal is None:
+            return None
+        found = overlays.recorded([("", "", self._shown)], signal)[place]
+        return found if found.lines else None
+
+    def _zoom_glance(self, window_s: Window | None) -> None:
+        one = self._glance_lines(0)
+        if one is not None:
+            self._draw_glance(clipped(window_s, one.every_time_s))
 
     def close_viewer(self) -> None:
         """Takes the viewer off the page, which frees its memory."""
@@ -200,7 +222,7 @@ class RunsResult:
 
     def compare(self, first: tuple[Entry, Any], second: tuple[Entry, Any]) -> None:
         """Two recordings, each as an entry and what was read of it."""
-        self._pair = first, second
+        self._pair, self._window = (first, second), None
         names = runs.signals(first[1], second[1]) or ["current_A"]
         self._signals = {SIGNALS[name].title: name for name in names}
         titles = {name: title for title, name in self._signals.items()}
@@ -219,16 +241,32 @@ class RunsResult:
         self._draw()
         self._table.content = runs.two_recordings_table(first[0], second[0])
 
+    def _chosen(self) -> str:
+        return self._signals.get(str(self._signal.value), "current_A")
+
+    def _lines(self, place: int) -> Lines | None:
+        if self._pair is None:
+            return None
+        (_, first), (_, second) = self._pair
+        found = overlays.recorded([("A", runs.FIRST, first), ("B", runs.SECOND, second)], self._chosen())[place]
+        return found if found.lines else None
+
+    def _zoom(self, window_s: Window | None) -> None:
+        one = self._lines(0)
+        if one is not None:
+            self._window = clipped(window_s, one.every_time_s)
+            self._draw()
+
     def _draw(self) -> None:
         if self._pair is None:
             return
         (_, first), (_, second) = self._pair
-        figure = runs.two_recordings(first, second, self._signals.get(str(self._signal.value), "current_A"))
+        figure = runs.two_recordings(first, second, self._chosen(), window_s=self._window)
         if self._plot is None:
             with self._place:
                 self._plot = self._page.server.gui.add_plotly(figure, config=_CONFIG, aspect=1.1)
-        else:
-            self._plot.figure = figure
+            self._page.measuring.add_rows(self._plot, 2, self._lines, self._zoom)
+        self._plot.figure = marked(figure, self._plot, rows=2)
 
 
 def _hint(text: str) -> Html:
@@ -253,6 +291,7 @@ class RunsPanel:
         self._page, self._viewer, self._recorded = page, viewer, recorded
         self._files, self._result = files, result
         self._by_hand = False  # chosen; else the newest is shown
+        self._growing = ""  # a run that is followed while it is being written
         self._seen: tuple[str, datetime] | None = None  # which is shown at a glance
         gui = page.server.gui
         self._choice: Any = gui.add_dropdown("Run", (NONE,))
@@ -302,9 +341,20 @@ class RunsPanel:
         self.refresh()
         self._open_chosen()
 
+    def follow(self, url: str, name: str) -> None:
+        """Shows a run while it is being written; the list has it from now on."""
+        self._growing, self._by_hand = name, True
+        self._choice.options = [name, *(one for one in self._recorded.names() if one != name)]
+        self._choice.value = name
+        self.refresh()
+        self._result.open(url, name)
+
     def refresh(self) -> None:
         """Reads the folder again."""
         names = self._recorded.names()
+        if self._viewer is None or self._growing in names or self._viewer.find_growing(self._growing) is None:
+            self._growing = ""
+        names = [*([self._growing] if self._growing else []), *names]
         if not self._by_hand or self._choice.value not in names:
             self._by_hand, chosen = False, (names or [NONE])[0]
         else:
@@ -341,10 +391,14 @@ class RunsPanel:
 
     def _show_chosen(self) -> None:
         name = str(self._choice.value)
-        exists = name != NONE
+        growing = bool(name) and name == self._growing
+        exists = name != NONE and not growing
         self._open.disabled = not exists or self._viewer is None
         self._rename.disabled = self._delete.disabled = not exists
         self._offer_others()
+        if growing:
+            self._card.content, self._link.content = _empty("It is being written; what it found comes at its end."), ""
+            return
         if not exists:
             self._card.content, self._link.content = _empty("None yet."), ""
             self._result.show(Html(), None)
@@ -508,6 +562,10 @@ class RunsTab(Tab):
         )
         for events in (shared.comparing.events, shared.discovering.events):
             events.kept.connect(lambda _: self.panel.refresh_soon())
+
+    def follow(self, url: str, name: str) -> None:
+        """Shows a run in the viewer while it is being written; from any thread."""
+        self.shared.files.post("follow", lambda: self.panel.follow(url, name))
 
     def takes(self) -> dict[str, Callable[[Path], None]]:
         """Sessions."""

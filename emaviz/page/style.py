@@ -10,7 +10,7 @@ from collections.abc import Sequence
 
 from emaviz.colours import HELD_OUT, LIMIT, rgb
 from emaviz.figures.theme import DARK, LIGHT
-from emaviz.page import charts, window_layout
+from emaviz.page import charts, measure, window_layout
 from emaviz.text.html import Html, html, unescaped
 
 STRIP = Html('<div class="emaviz-strip"></div>')  # stands in the panel that becomes the strip
@@ -35,6 +35,14 @@ def page() -> Html:
         "[data-dock-region=left] [data-dock-tab]{padding-left:3px!important;padding-right:3px!important;"
         "font-size:11.5px!important}[data-dock-region=left] [data-dock-tab] *{font-size:inherit!important}"
         "[data-dock-region=left] [data-dock-tab] > div:has(svg){display:none!important}"
+        # tabs stay in sight where what is below them scrolls
+        ".mantine-ScrollArea-content [data-dock-area],[data-dock-region=left] .mantine-ScrollArea-content "
+        "div:has(> div > div > div > [data-dock-area]){overflow:clip!important}"
+        ".mantine-ScrollArea-content [data-dock-strip]{position:sticky!important;top:0;z-index:4;"
+        "background:var(--mantine-color-body)}"
+        # of which the upper edge of one within a result overlaps the control above it
+        "[data-dock-region=right] .mantine-ScrollArea-content [data-dock-strip]{top:-6px;"
+        "background:linear-gradient(transparent 6px,var(--mantine-color-body) 6px)}"
         # a slider's number in full: viser's box has room for five characters
         ".mantine-Slider-root ~ .mantine-NumberInput-root,"
         "div:has(> .mantine-Slider-root) + .mantine-NumberInput-root,"
@@ -63,7 +71,7 @@ def page() -> Html:
         "{width:8.4em!important}"
         "</style>"
     )
-    return rules + _strip() + window_layout.style() + charts.style()
+    return rules + _strip() + window_layout.style() + charts.style() + measure.style()
 
 
 def _strip() -> Html:

@@ -15,8 +15,9 @@ LEFT_PX = 380
 _USUAL_WINDOW_PX = 1400
 _NARROWEST_PX, _WIDEST_PX = 340, 1000
 TWO_COLUMNS_PX = 1240  # from which width on what stands in two columns does
+NARROW_PX = 577  # from which width on viser has panels: narrower, all of it is one sheet, and they come back anew
 # Widths by which windows are told apart: what is docked is laid out for the widest that is no wider than the window.
-WINDOWS_PX = (900, 1000, 1100, 1200, TWO_COLUMNS_PX, 1300, 1400, 1500, 1600, 1700, 1800, 1900, 2100, 2300, 2600)
+WINDOWS_PX = (0, NARROW_PX, 900, 1000, 1100, 1200, TWO_COLUMNS_PX, *range(1300, 2000, 100), 2100, 2300, 2600)
 _SHOWN_S = 0.15
 
 
@@ -67,9 +68,12 @@ class Docked:
 
     def fit(self, client: int, window_px: int) -> None:
         """Lays one window out for its width, one of `WINDOWS_PX`."""
-        if self._window_px.get(client, _USUAL_WINDOW_PX) != window_px:
+        before = self._window_px.get(client, _USUAL_WINDOW_PX)
+        if before != window_px:
             self._window_px[client] = window_px
             self._set_width(client)
+            if before < NARROW_PX:
+                self._inside.set_width(client, self._server.gui.main_panel, LEFT_PX)
 
     def _set_width(self, client: int) -> None:
         panel, share = self._panels[self._seen.get(client, self._first)]
@@ -93,17 +97,19 @@ ALL_COLUMNS = Html('<div class="emaviz-all-columns"></div>')  # stands in a fold
 PLOTS_EARLY = Html('<div class="emaviz-early"></div>')
 ROOM = Html('<div class="emaviz-room"></div>')  # stands in a folder that only a large window has room for
 _ROOM_PX = 1700, 940  # of such a window, width and height
-_LEAST_WIDTH_PX = 900  # of a window
+LEAST_WIDTH_PX = 900  # of a window whose actuator is an inset; figures are as high as in it where it is narrower
 _STRIP_PX = 76  # of the playback below
+_FOLDED_PX = 38  # high, of an inset that is folded away but for its buttons
 _CLICK_PX = 4  # a pointer that moves further turns the actuator
 
 _SCRIPT = """
 (() => {
   window.emavizInset?.end();
-  let asked = false, low = false, grown = false, down = null;
+  let asked = false, low = false, grown = false, folded = false, down = null;
   const root = document.documentElement, body = document.body, button = document.createElement('button');
-  button.className = 'emaviz-grow';
-  body.append(button);
+  const fold = document.createElement('button');
+  button.className = fold.className = 'emaviz-grow';
+  body.append(button, fold);
   const picture = () => document.querySelector('[data-dock-root] > div:has(> canvas)');
   const dress = () => {
     const at = picture(), left = document.querySelector('[data-dock-region=left]');
@@ -112,10 +118,13 @@ _SCRIPT = """
     if (left) root.style.setProperty('--emaviz-left', `${left.getBoundingClientRect().width}px`);
     body.classList.toggle('emaviz-inset', inset);
     body.classList.toggle('emaviz-low-inset', inset && low);
+    const told = document.querySelector('.mantine-Notification-root');  // which stands on the picture
+    body.classList.toggle('emaviz-folded-inset', inset && folded && !told);
     button.style.display = can ? 'block' : 'none';
+    fold.style.display = inset ? 'block' : 'none';
     if (at) {  // what is told stands on the picture, beside the button
       const box = at.getBoundingClientRect(), above = inset ? 6 : 52;
-      const note = { left: box.left + 6, top: box.top + above, width: Math.min(box.width - (inset ? 50 : 12), 440),
+      const note = { left: box.left + 6, top: box.top + above, width: Math.min(box.width - (inset ? 80 : 12), 440),
                      height: (inset ? box.height : Math.min(box.height, innerHeight - STRIP)) - above - 6 };
       for (const [side, px] of Object.entries(note)) root.style.setProperty(`--emaviz-note-${side}`, `${px}px`);
     }
@@ -126,6 +135,11 @@ _SCRIPT = """
     button.textContent = inset ? '⤢' : '⤡';
     button.title = inset ? 'Larger actuator' : 'Smaller actuator';
     button.setAttribute('aria-label', button.title);
+    fold.style.left = `${box.right - 64}px`;
+    fold.style.top = button.style.top;
+    fold.textContent = folded ? '▴' : '▾';
+    fold.title = folded ? 'Show the actuator' : 'Fold the actuator away';
+    fold.setAttribute('aria-label', fold.title);
   };
   const grow = (to) => { grown = to; dress(); };
   const pressed = (event) => {
@@ -136,6 +150,7 @@ _SCRIPT = """
     down = null;
   };
   button.addEventListener('click', () => grow(!grown));
+  fold.addEventListener('click', () => { folded = !folded; dress(); });
   document.addEventListener('pointerdown', pressed, true);
   document.addEventListener('pointerup', released, true);
   const timer = setInterval(dress, 100);
@@ -144,6 +159,7 @@ _SCRIPT = """
     end: () => {
       clearInterval(timer);
       button.remove();
+      fold.remove();
       document.removeEventListener('pointerdown', pressed, true);
       document.removeEventListener('pointerup', released, true);
     },
@@ -155,7 +171,7 @@ _SCRIPT = """
 def script() -> str:
     """To run in every page: `window.emavizInset.enter(inset, lower)` lays it out for a workspace."""
     return (
-        _SCRIPT.replace("LEAST", str(_LEAST_WIDTH_PX)).replace("CLICK", str(_CLICK_PX)).replace("STRIP", str(_STRIP_PX))
+        _SCRIPT.replace("LEAST", str(LEAST_WIDTH_PX)).replace("CLICK", str(_CLICK_PX)).replace("STRIP", str(_STRIP_PX))
     )
 
 
@@ -169,6 +185,7 @@ def style() -> Html:
         "<style>"
         ":root{--emaviz-inset:clamp(150px,calc(46vh - 138px),330px)}"
         "body.emaviz-low-inset{--emaviz-inset:clamp(130px,calc(46vh - 138px),180px)}"
+        f"body.emaviz-folded-inset{{--emaviz-inset:{_FOLDED_PX}px}}"
         f"{inset} [data-dock-root] > div:has(> canvas){{inset:auto auto 8px 8px!important;"
         "width:calc(var(--emaviz-left) - 16px)!important;height:var(--emaviz-inset)!important;z-index:6;"
         "border:1px solid rgba(134,142,150,.55);border-radius:6px;overflow:hidden;cursor:pointer}"

@@ -14,6 +14,7 @@ import viser
 from ema_model.errors import InputError
 from emaviz.page import charts, window_layout
 from emaviz.page.charts import ChartHeights
+from emaviz.page.measure import Measuring
 from emaviz.page.style import unseen
 from emaviz.page.window_layout import Docked
 from emaviz.server.field_error import say_beside
@@ -120,7 +121,7 @@ _SCRIPT = """
   const views = VIEWS, sizes = SIZES, titles = Object.fromEntries(views.map(v => [v.title, v]));
   window.emavizViews?.end();
   const asked = new URLSearchParams(location.search).get('view');
-  let wanted = views.some(v => v.name === asked) ? asked : FIRST, told = null, pressed = 0;
+  let wanted = views.some(v => v.name === asked) ? asked : FIRST, told = null, pressed = 0, at = null;
   const fitted = {}, passing = {};
   const tabs = () => [...document.querySelectorAll('[role=tab]')].filter(t => t.textContent.trim() in titles);
   const view = (tab) => titles[tab.textContent.trim()];
@@ -141,6 +142,7 @@ _SCRIPT = """
       return;
     }
     wanted = null;
+    at = front;
     if (now.name === told) return;
     told = now.name;
     window.emavizInset?.enter(now.inset, now.lower);
@@ -162,7 +164,13 @@ _SCRIPT = """
   };
   const seen = new MutationObserver(look);
   seen.observe(document.body, { subtree: true, attributes: true, attributeFilter: ['aria-selected'] });
-  const timer = setInterval(() => { if (told === null || wanted !== null) look(); }, 100);
+  const timer = setInterval(() => {
+    if (at && !at.isConnected) {  // a window that was narrow, however shortly, has tabs and panels anew
+      [wanted, at, fitted.innerWidth] = [told, null, sizes.innerWidth[0].px];
+      window.emavizPress(sizes.innerWidth[0].button);
+    }
+    if (told === null || wanted !== null) look();
+  }, 100);
   const sizing = setInterval(fit, 250);
   window.emavizViews = {
     go: (name) => { wanted = name; look(); },
@@ -272,7 +280,7 @@ class Workspaces:
 
     def _fit_width(self, client: int, window_px: int) -> None:
         self._docked.fit(client, window_px)
-        self.heights.fit_width(client, window_px)
+        self.heights.fit_width(client, max(window_px, window_layout.LEAST_WIDTH_PX))
 
     def _left(self, client: viser.ClientHandle) -> None:
         self.heights.forget(client.client_id)
@@ -291,6 +299,7 @@ class Page:
     session: Session
     screen: Worker  # draws, at a pace that browsers can follow
     workspaces: Workspaces  # which windows are where
+    measuring: Measuring  # of charts over time
     folder: Path | None = None  # of the data, whose files messages name without it
     _refused: set[str] = field(default_factory=set)  # controls beside which something is said
 

@@ -241,7 +241,7 @@ def _dashboard(contents: Contents) -> rrb.Container:
     names = list(contents.algorithms)
     fits = [
         view(
-            f"{signal_title(signal)}: measured, and the best model of this iteration",
+            f"{signal_title(signal)}: measured, best model",
             [
                 f"{axes_path(signal)}/**",
                 *(f"{algorithm_path(name)}/fit/{signal}/**" for name in names),
@@ -381,7 +381,7 @@ def _convergence(names: Iterable[str], *, legend: bool = False, falls: bool = Fa
     """The best error of each iteration; the corrected one takes the other's place once it is there."""
     kinds = ("log10_rmse", "log10_corrected_error")
     paths = [f"{algorithm_path(name)}/{kind}" for name in names for kind in kinds]
-    title = "Convergence: log10 of the error of the best [A], corrected once all have ended"
+    title = "Convergence: log10 of the error [A], corrected at the end"
     return plot(title, paths, legend=legend, linked=False, falls=falls)
 
 

@@ -37,6 +37,17 @@ _ADDRESS = re.compile(r"Hosting a web-viewer at (http://127\.0\.0\.1:\d+)")
 # Links to its makers' fonts: refused as a style sheet, which is an error in the console, but not as a connection.
 _ABROAD = re.compile(rb"\s*<link\b[^>]*https?://[^>]*>")
 _TITLE = re.compile(rb"<title>[^<]*</title>")
+# The viewer asks its makers' servers for news and sends them telemetry. The page's policy refuses that, which is an
+# error in the console each time: here it has an empty answer before it is asked.
+_AT_HOME = b"""<script>
+{ const asked = window.fetch;
+  window.fetch = (what, how) => {
+    const { protocol, hostname } = new URL(what.url ?? what, location.href);
+    const here = ['127.0.0.1', 'localhost'].includes(hostname) || !protocol.startsWith('http');
+    return here ? asked(what, how) : Promise.resolve(new Response('{}', { status: 404 }));
+  };
+}
+</script>"""
 _TIMEOUT_S = 20.0
 
 
@@ -106,8 +117,9 @@ def _copy(address: str):
 
 
 def _page(body: bytes) -> bytes:
-    """The viewer's page without its makers' fonts, under the app's name."""
-    return _TITLE.sub(b"<title>Recording \xe2\x80\x93 emaviz</title>", _ABROAD.sub(b"", body), count=1)
+    """The viewer's page without its makers' fonts and servers, under the app's name."""
+    title = b"<title>Recording \xe2\x80\x93 emaviz</title>" + _AT_HOME
+    return _TITLE.sub(lambda _: title, _ABROAD.sub(b"", body), count=1)
 
 
 # --- hosts the Rerun web viewer and recordings on the loopback interface, without any other network -------------------

@@ -16,6 +16,7 @@ import rerun as rr
 import rerun.blueprint as rrb
 import rerun_bindings
 from numpy.typing import ArrayLike, NDArray
+from rerun.chunk import Chunk, RrdReader
 from rerun.error_utils import catch_and_log_exceptions
 
 from ema_model.identification.run import algorithm_title
@@ -23,11 +24,13 @@ from ema_model.text import Block, Facts, Lines, Note, Remarks
 from emaviz.recording import blueprint, style
 from emaviz.recording.blueprint import Algorithm, Chart, Contents, build, send
 from emaviz.recording.entry import MIN_FREE_BYTES, RecordingError, claim, free_bytes, part_of
-from emaviz.recording.style import APPLICATION, ITERATION, K_NAMES, Colour, algorithm_path
+from emaviz.recording.style import ANSWER, APPLICATION, ITERATION, K_NAMES, Colour, algorithm_path
 
 # --- one .rrd file while it is written: its stream, its lock, its failures and its end --------------------------------
 
 _FLUSH_TIMEOUT_S = 5.0
+_PROPERTIES = "/__properties"  # rerun's own: the recording's name and when it began
+_LARGEST_TO_ORDER = 100_000_000  # bytes, which are all in memory then
 
 
 class RrdFile:
@@ -54,10 +57,7 @@ class RrdFile:
             raise RecordingError(f"{path}: cannot be recorded: {_one_line(error)}") from error
 
     def _start(self, name: str) -> rr.RecordingStream:
-        stream = rr.RecordingStream(APPLICATION, recording_id=str(uuid.uuid4()))
-        # With its own two timelines off and no call to set_time, data has the times we give and no others.
-        stream.set_log_time_enabled(False)
-        stream.set_log_tick_enabled(False)
+        stream = _new_stream(str(uuid.uuid4()))
         stream.save(self.part)
         if not self.part.exists():
             raise OSError("rerun is turned off; is RERUN=off set in the environment?")
@@ -95,8 +95,10 @@ class RrdFile:
         """The first failure is the one to tell."""
         self.failed = self.failed or f"{self.path}: {why}; what there is: {self.part.name}"
 
-    def close(self, last: Callable[[], None], timeout_s: float) -> None:
-        """Does `last`, then finishes the file.  Never raises, and returns within `timeout_s`, about.
+    def close(self, last: Callable[[], rrb.Blueprint], timeout_s: float) -> None:
+        """Does `last`, then finishes the file, with the layout it gives and what that shows first at the beginning.
+
+        Never raises, and returns within `timeout_s`, about.
 
         On a full disk rerun may wait for ever: then the part stays, locked until this process ends.
         """
@@ -107,14 +109,17 @@ class RrdFile:
             self._fail(f"not finished within {timeout_s:g} s")
             rr.unregister_shutdown()  # it would wait as well, and the interpreter could not end
 
-    def _finish(self, last: Callable[[], None]) -> None:
+    def _finish(self, last: Callable[[], rrb.Blueprint]) -> None:
         with self.lock:
             if self._closed:
                 return
-            self.do(lambda _: last())
+            layouts: list[rrb.Blueprint] = []
+            self.do(lambda _: layouts.append(last()))
             self._closed = True
             try:
                 self._stream.disconnect()
+                if self._sound and layouts:
+                    self._put_in_order(layouts[0])
                 if self._sound:
                     os.replace(self.part, self.path)
             except Exception as error:
@@ -123,6 +128,44 @@ class RrdFile:
             self._owner.release()
         # Each stream leaves two threads behind until this is called.
         rerun_bindings.flush_and_cleanup_orphaned_recordings()
+
+    def _put_in_order(self, layout: rrb.Blueprint) -> None:
+        """Rewrites the part in the order in which it is looked at; where that is not possible, it stays as it is.
+
+        A viewer shows what it has read so far: in the order of writing, the answer and the layout would come last.
+        """
+        size = self.part.stat().st_size
+        if size > _LARGEST_TO_ORDER or free_bytes(self.path.parent) < size + self._min_free_bytes // 10:
+            return
+        ordered = self.part.with_suffix(".ordered")
+        try:
+            with catch_and_log_exceptions(strict=True):
+                reader = RrdReader(self.part)
+                chunks = sorted(reader.stream().to_chunks(), key=_place)
+                stream = _new_stream(reader.recordings()[0].recording_id, send_properties=False)
+                stream.save(ordered)
+                send(stream, layout)
+                stream.send_chunks(chunks)
+                stream.flush(timeout_sec=_FLUSH_TIMEOUT_S)
+                stream.disconnect()
+            os.replace(ordered, self.part)
+        except Exception:  # rerun has many, and the part is whole
+            ordered.unlink(missing_ok=True)
+
+
+def _place(chunk: Chunk) -> int:
+    """Its name and the answer, the rest of what has no time, what goes over iterations, and signals over time."""
+    if chunk.is_static:
+        return 0 if chunk.entity_path.startswith((ANSWER, _PROPERTIES)) else 1
+    return 2 if ITERATION in chunk.timeline_names else 3
+
+
+def _new_stream(recording_id: str, *, send_properties: bool = True) -> rr.RecordingStream:
+    stream = rr.RecordingStream(APPLICATION, recording_id=recording_id, send_properties=send_properties)
+    # With its own two timelines off and no call to set_time, data has the times we give and no others.
+    stream.set_log_time_enabled(False)
+    stream.set_log_tick_enabled(False)
+    return stream
 
 
 def _one_line(error: BaseException) -> str:
@@ -541,12 +584,13 @@ class RecordingWriter:
         self._wake.set()
         self._file.close(self._last, self._close_timeout_s)
 
-    def _last(self) -> None:
+    def _last(self) -> rrb.Blueprint:
         self.flush()
+        layout = self._layout()
         # Only now is it known what to arrange; the viewer would stumble through several layouts in one file.
-        if self._contents == self._expected:
-            return
-        self._file.do(lambda stream: send(stream, self._layout()))
+        if self._contents != self._expected:
+            self._file.do(lambda stream: send(stream, layout))
+        return layout
 
     def _layout(self) -> rrb.Blueprint:
         """How what is in the file opens."""

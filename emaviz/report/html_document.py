@@ -22,6 +22,7 @@ from ema_model.text import InWords, Lines, Note, Table
 from emaviz import __version__
 from emaviz.figures.theme import DARK, LIGHT
 
+_FEW_COLUMNS = 2  # that a narrow page has room for
 _STRONG = "\x1e"  # before the number that a row is marked by
 
 
@@ -44,18 +45,21 @@ def bullets(texts: Iterable[object], kind: str = "") -> str:
 def table(heads: Sequence[str], rows: Iterable[Sequence[object]], *, text_columns: int = 1, marked: str = "") -> str:
     """A table of plain texts; the first `text_columns` are set left, the others, numbers, right.
 
-    marked: a cell that starts with this sign is set strongly, without the sign.
+    marked: a cell that starts with this sign is set strongly, without the sign.  On a narrow page, a row of more
+    columns than it has room for becomes a list, in which each value has its column's title beside it.
     """
 
     def cell(tag: str, at: int, value: object) -> str:
         text = str(value)
         strong = bool(marked) and text.startswith(marked)
         kind = " ".join(["" if at < text_columns else "n", "strong" if strong else ""]).strip()
-        return f"<{tag}{_class(kind)}>{escape(text.removeprefix(marked) if strong else text)}</{tag}>"
+        of = f' data-of="{escape(heads[at])}"' if tag == "td" and at < len(heads) else ""
+        return f"<{tag}{_class(kind)}{of}>{escape(text.removeprefix(marked) if strong else text)}</{tag}>"
 
     head = "".join(cell("th", i, title) for i, title in enumerate(heads))
     body = "".join("<tr>" + "".join(cell("td", i, v) for i, v in enumerate(row)) + "</tr>" for row in rows)
-    return f'<div class="wide"><table><thead><tr>{head}</tr></thead><tbody>{body}</tbody></table></div>'
+    many = " many" if len(heads) > _FEW_COLUMNS else ""
+    return f'<div class="wide{many}"><table><thead><tr>{head}</tr></thead><tbody>{body}</tbody></table></div>'
 
 
 def document_table(told: Table | None, title: str) -> str:

@@ -510,8 +510,9 @@ class Machine:
         self._labels = Labels(scene, f"{root}{_LABELS}", _NAMES)
 
     def fit(self, shown: Frame, picture: tuple[int, int]) -> None:
-        """Lays the labels out for a picture, px."""
-        self._labels.fit(shown, picture)
+        """Lays the labels out for a picture, px; they and their lines move together."""
+        with self._owner.atomic():
+            self._labels.fit(shown, picture)
 
     def set_opacity(self, opacity: float) -> None:
         """Of the housing, 0 … 1."""
@@ -519,7 +520,8 @@ class Machine:
 
     def show_labels(self, shown: bool) -> None:
         """Names of the parts, and what is said of them."""
-        self._labels.show(shown)
+        with self._owner.atomic():
+            self._labels.show(shown)
 
     def tell(self, callouts: Sequence[Callout], drive: str = "", load: str = "") -> None:
         """Marks the places of faults, and says what they are; what is set in the drive; the load."""

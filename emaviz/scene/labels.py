@@ -290,14 +290,20 @@ class Labels:
                 x, y = 2.0 * edge / self._picture - 1.0
                 points.append([self._frame.at(x, -y, one.depth), one.label.place])
         lines = np.array(points, np.float32).reshape(-1, 2, 3)
-        if self._sent.get(name) == (lines.tobytes(),):
+        if self._sent.get(name, (b"",)) == (lines.tobytes(),):
             return
         self._sent[name] = (lines.tobytes(),)
         handle = self._lines.get(name)
-        if handle is not None:
-            handle.remove()
+        if not len(lines):
+            if handle is not None:
+                handle.remove()
             self._lines[name] = None
-        if len(lines):
+            return
+        if handle is None:
             self._lines[name] = self._scene.add_line_segments(
                 name, points=lines, colors=colour, thickness=thickness, thickness_units="screen"
             )
+            return
+        if lines.shape != handle.points.shape:  # a new line would be drawn later than its label moves
+            handle.colors = np.broadcast_to(np.array(colour, np.uint8), lines.shape)
+        handle.points = lines

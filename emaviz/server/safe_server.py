@@ -30,6 +30,8 @@ from emaviz.server.messages import LARGEST_FRAME
 from emaviz.server.viser_private import keep_icons
 
 SCENES = "/scenes/"  # below which the actuator's saved scenes are served
+SIGNALS = "/signals"  # where the page's script asks about charts
+_OWN_HEADER = "X-Emaviz"  # of such a question: no other page's script can send it without asking first
 _opening = threading.Lock()
 
 
@@ -39,11 +41,13 @@ def open_server(
     door: Door | None = None,
     viewer: Callable[[], str | None] = lambda: None,
     scene: Callable[[str], bytes | None] = lambda _: None,
+    signals: Callable[[str], bytes | None] = lambda _: None,
 ) -> viser.ViserServer:
     """A viser server on exactly this address; InputError if it cannot be had.
 
     door: who gets an answer, by default this machine alone; viewer: the address of the Rerun viewer, which the page
-    may show, once there is one; scene(name): a page below `SCENES`, or None.
+    may show, once there is one; scene(name): a page below `SCENES`, or None; signals(query): JSON at `SIGNALS`, or
+    None.  Both are called on threads of their own.
     """
     door = Door(host) if door is None else door
     _check_free(host, port)
@@ -55,7 +59,7 @@ def open_server(
 
         def guarded(handler: Any, *arguments: Any, process_request: Any = None, **options: Any) -> Any:
             options |= {"max_size": LARGEST_FRAME, "logger": complain.log()}
-            guard = _guard(process_request, door, viewer, scene)
+            guard = _guard(process_request, door, viewer, scene, signals)
             return plain(_listening(handler, opened, complain), *arguments, process_request=guard, **options)
 
         websockets.asyncio.server.serve = guarded  # type: ignore[assignment]
@@ -118,15 +122,22 @@ def _guard(
     door: Door,
     viewer: Callable[[], str | None],
     scene: Callable[[str], bytes | None],
+    signals: Callable[[str], bytes | None],
 ) -> Callable[..., Awaitable[Response | None]]:
     async def process_request(connection: ServerConnection, request: Request) -> Response | None:
         port = connection.local_address[1]
         refusal = door.refusal(request.path, request.headers, port)
         if refusal is not None:
             return _refused(refusal)
-        path = unquote(urlsplit(request.path).path)
+        asked = urlsplit(request.path)
+        path = unquote(asked.path)
         if path.startswith(SCENES):
-            response = _page(await asyncio.to_thread(scene, path.removeprefix(SCENES)))
+            response = _answer(await asyncio.to_thread(scene, path.removeprefix(SCENES)), "text/html", "scene")
+        elif path == SIGNALS:
+            own = _OWN_HEADER in request.headers
+            response = _answer(
+                await asyncio.to_thread(signals, asked.query) if own else None, "application/json", "chart"
+            )
         else:
             response = None if inner is None else inner(connection, request)
         if inspect.isawaitable(response):
@@ -159,10 +170,11 @@ def _named(body: bytes, zipped: bool) -> bytes:
     return gzip.compress(named, compresslevel=1, mtime=0) if zipped else named
 
 
-def _page(body: bytes | None) -> Response:
-    """A page of ours, or that there is none."""
-    status, kind = (http.HTTPStatus.OK, "text/html") if body is not None else (http.HTTPStatus.NOT_FOUND, "text/plain")
-    body = b"There is no such scene.\n" if body is None else body
+def _answer(body: bytes | None, kind: str, what: str) -> Response:
+    """An answer of ours, or that there is no such thing."""
+    status = http.HTTPStatus.OK if body is not None else http.HTTPStatus.NOT_FOUND
+    if body is None:
+        body, kind = f"There is no such {what}.\n".encode(), "text/plain"
     headers = Headers(
         {"Content-Type": f"{kind}; charset=utf-8", "Content-Length": str(len(body)), "Connection": "close"}
     )

@@ -101,7 +101,7 @@ class Inside:
         if width_px is not None:
             self.set_width(client, panel, width_px)
 
-    def set_width(self, client: int, panel: viser.PanelHandle, width_px: int) -> None:
+    def set_width(self, client: int, panel: viser.PanelHandle | _gui_handles.MainPanelHandle, width_px: int) -> None:
         """How wide a panel is in one page."""
         gui = self._server.gui
         placed = gui._next_layout_counter(), gui._layout_run_id

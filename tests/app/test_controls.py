@@ -347,6 +347,7 @@ def test_a_recording_is_chosen_and_watched_while_it_grows(page, app):
     frame.wait_for()
     growing = session.folder / app.tab(IdentifyTab).panel._race.growing.name
     assert growing.name in frame.get_attribute("src") and not growing.exists(), "it is still being written"
+    assert page.get_by_label("Run", exact=True).input_value() == growing.name, "and in the list"
     page.get_by_role("button", name="Close the viewer").click()
     frame.wait_for(state="detached")
     show(page, "Identify")

@@ -18,7 +18,8 @@ from ema_model.recordings import Measurement
 from ema_model.recordings.read import read_measurement
 from ema_model.simulation.run import Run, simulate_monitor, simulate_reference
 from emaviz.figures import runs as runs_figures
-from emaviz.figures.runs import _within, at, beneath, differences, metrics, rise_time_s, run_metrics_table
+from emaviz.figures.lines import within
+from emaviz.figures.runs import at, beneath, differences, metrics, rise_time_s, run_metrics_table
 from emaviz.page.explore.tab import CUSTOM, PRESETS, ExploreTab, name_of
 from emaviz.page.identify.tab import IdentifyTab
 from emaviz.session.explore import Session
@@ -118,7 +119,7 @@ def test_a_frozen_run_is_hidden_where_it_has_no_values(runs):
 @pytest.mark.parametrize("window", [(0.0, 0.5), (0.1, 0.2), (0.5, 0.5), (9.0, 10.0)])
 def test_a_window_keeps_two_samples_or_more(window):
     time_s = np.arange(5001) * 1e-4
-    shown = time_s[_within(time_s, window)]
+    shown = time_s[within(time_s, window)]
     assert len(shown) >= 2 and shown[0] <= max(window[0], shown[0])
     if window == (0.1, 0.2):
         assert shown[0] == pytest.approx(0.1) and shown[-1] == pytest.approx(0.2)

@@ -71,6 +71,34 @@ def test_results_have_the_width_beside_an_inset_that_grows_at_a_click(page):
     wait_until(lambda: box(page, PICTURE)[3] - box(page, PICTURE)[1] > 700.0, 10.0)
 
 
+TABS = """() => [...document.querySelectorAll('[data-dock-region=left] [role=tab]')].map(tab => {
+  const box = tab.getBoundingClientRect();
+  return [tab.textContent.trim(), tab.ariaSelected, Math.round(box.top), Math.round(box.left)]; })"""
+SCROLL = """(px) => { const tabs = document.querySelector('[data-dock-region=left] [role=tab]');
+  tabs.closest('.mantine-ScrollArea-viewport').scrollTop = px; }"""
+
+
+def test_tabs_stay_in_sight_and_a_window_that_was_narrow_is_as_before(page):
+    go(page, "Compare")
+    wait_until(lambda: page.evaluate(TABS)[2][1] == "true", 10.0)
+    page.wait_for_timeout(300)
+    before, width = page.evaluate(TABS), box(page, RIGHT)[0]
+    assert len({top for _, _, top, _ in before}) == 1, "in one line"
+    page.evaluate(SCROLL, 200)
+    page.wait_for_timeout(200)
+    assert all(abs(a[2] - b[2]) <= 4 for a, b in zip(page.evaluate(TABS), before)), "while what is below them scrolls"
+    page.evaluate(SCROLL, 0)
+    page.set_viewport_size({"width": 390, "height": 844})
+    wait_until(lambda: not page.evaluate(TABS), 20.0)
+    page.get_by_role("tab", name="Compare", exact=True, selected=True).wait_for()
+    page.set_viewport_size({"width": 1400, "height": 900})
+    wait_until(lambda: page.evaluate(TABS) == before and abs(box(page, RIGHT)[0] - width) <= 1.0, 20.0)
+    page.get_by_role("button", name="Fold the actuator away").click()
+    wait_until(lambda: box(page, PICTURE)[3] - box(page, PICTURE)[1] < 45.0, 10.0)
+    page.get_by_role("button", name="Show the actuator").click()
+    wait_until(lambda: box(page, PICTURE)[3] - box(page, PICTURE)[1] > 140.0, 10.0)
+
+
 COVERED = """() => {
   const roots = [...document.querySelectorAll('.mantine-Notifications-root')];
   const root = roots.find(one => one.querySelector('.mantine-Notification-root'));

@@ -136,7 +136,14 @@ def test_a_bad_file_is_refused_in_one_line(tmp_path, content, message):
 def test_a_file_cut_in_the_middle_is_read_as_far_as_it_goes(written, tmp_path):
     whole = written[0].read_bytes()
     cut = tmp_path / "cut.rrd"
-    cut.write_bytes(whole[: len(whole) // 2])
+    cut.write_bytes(whole[: len(whole) * 9 // 10])  # what it found stands first, signals over time stand last
     found = read(cut)
-    assert "current_A" in found.signals["reference"]
-    assert cut.read_bytes() == whole[: len(whole) // 2]
+    assert found.identification and "current_A" in found.signals["reference"]
+    assert cut.read_bytes() == whole[: len(whole) * 9 // 10]
+
+
+def test_what_is_looked_at_first_stands_first(written):
+    """A viewer shows what it has read so far."""
+    chunks = [chunk for chunk in RrdReader(written[0]).stream().to_chunks() if not chunk.is_static]
+    over_time = ["iteration" not in chunk.timeline_names for chunk in chunks]
+    assert over_time == sorted(over_time) and 0 < sum(over_time) < len(over_time)

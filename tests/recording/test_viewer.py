@@ -42,6 +42,7 @@ def get(host, path, *, method="GET", **headers):
 def test_the_viewer_is_served_and_may_call_nobody(host):
     page, body = get(host, "/?url=x")
     assert b"fonts." not in body, "a link is a connection that no policy refuses"
+    assert body.index(b"window.fetch = ") < body.index(b"re_viewer.js"), "who asks abroad is answered at home"
     assert page.status == 200 and b"re_viewer.js" in body and page.headers["Content-Type"].startswith("text/html")
     policy = page.headers["Content-Security-Policy"]
     assert "connect-src 'self' blob: data: http://127.0.0.1:*;" in policy and "default-src 'self'" in policy

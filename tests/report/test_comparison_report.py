@@ -180,11 +180,13 @@ def _nothing_is_covered(tab: Any) -> None:
 
 @pytest.mark.long
 @pytest.mark.browser
-def test_legends_and_titles_cover_nothing_on_a_telephone(report, tab):
-    tab.set_viewport_size({"width": 420, "height": 900})
+def test_nothing_is_covered_or_cut_on_a_telephone(report, tab):
+    tab.set_viewport_size({"width": 390, "height": 844})
     tab.goto(report.as_uri())
     _draw_all(tab)
     _nothing_is_covered(tab)
+    wide = "[...document.querySelectorAll('html, .wide')].filter(one => one.scrollWidth > one.clientWidth + 1)"
+    assert not tab.evaluate(f"{wide}.map(one => one.textContent.slice(0, 80))"), "every column is seen"
 
 
 def _until(tab: Any, condition: str) -> None:

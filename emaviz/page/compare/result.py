@@ -20,11 +20,13 @@ from ema_model.estimation.floor import BAND_SIGMAS
 from ema_model.faults import HEALTHY
 from ema_model.quantities.variables import VARIABLES
 from ema_model.recordings import Measurement
-from emaviz.figures import campaign
+from emaviz.figures import campaign, lines, overlays
 from emaviz.figures import comparison as comparison_figures
+from emaviz.figures.lines import Lines, Window, clipped
 from emaviz.figures.theme import why_missing
 from emaviz.page.compare import WORKSPACE
 from emaviz.page.compare.files import RawLines
+from emaviz.page.measure import hint, marked
 from emaviz.page.panel import Cleared
 from emaviz.page.playback import PlaybackStrip
 from emaviz.page.style import IN_PAIRS
@@ -84,6 +86,7 @@ class View:
     recording: int = 0
     region: Region | None = None
     moment_s: float | None = None
+    together: bool = False  # all recordings over each other, over time
 
 
 @dataclass
@@ -105,21 +108,19 @@ class ComparePlots:
     def __init__(self, page: Page) -> None:
         self._page = page
         self._view: View | None = None
+        self._window: Window | None = None  # of time, that is shown; None: all
         gui = page.server.gui
         self._signal = gui.add_dropdown("Signal", [_EMPTY])
         self._titles: dict[str, str] = {}
         self._variables: dict[str, str] = {}
         tabs = gui.add_tab_group()
         with tabs.add_tab("Time", viser.Icon.CHART_LINE):
+            add_html(gui, hint())
             self._time = [
-                self._add(
-                    lambda v: comparison_figures.overlay(v.comparison, self._chosen(), v.recording, **_marks(v)), 0.42
-                ),
-                self._add(
-                    lambda v: comparison_figures.residual_time(v.comparison, self._chosen(), v.recording, **_marks(v)),
-                    0.42,
-                ),
+                self._add(lambda v: self._draw_time(v, comparison_figures.overlay, 0), 0.42),
+                self._add(lambda v: self._draw_time(v, comparison_figures.residual_time, 1), 0.42),
             ]
+            page.measuring.add([plot.handle for plot in self._time], self._lines, self._zoom)
         with tabs.add_tab("Against", viser.Icon.CHART_DOTS):
             self._variable = gui.add_dropdown("Variable", [_EMPTY])
             self._against = [self._add(self._draw_against, 0.66)]
@@ -144,7 +145,7 @@ class ComparePlots:
 
     def begin(self, view: View) -> None:
         """A new comparison: its signals and variables to choose from, the telling ones first."""
-        self._view = view
+        self._view, self._window = view, telling_window(view)
         comparison = view.comparison
         self._titles = {
             comparison_figures.quantity_of_signal(comparison, name).title: name
@@ -166,7 +167,11 @@ class ComparePlots:
 
     def show(self, view: View) -> None:
         """Another region, moment or recording of the same comparison."""
-        self._view = view
+        before, self._view = self._view, view
+        if before is None or (view.recording, view.together) != (before.recording, before.together):
+            self._window = telling_window(view)
+        if view.moment_s is not None and self._window and not self._window[0] <= view.moment_s <= self._window[1]:
+            self._window = None
         if view.region is not None:
             self._choose(view.region.signal, view.region.variable)
         self._draw(list(self._all()))
@@ -187,6 +192,44 @@ class ComparePlots:
 
     def _chosen(self) -> str | None:
         return self._titles.get(str(self._signal.value))
+
+    def _signal_shown(self, view: View) -> str:
+        return self._chosen() or view.comparison.primary
+
+    def _every(self, view: View) -> list[Lines]:
+        """What the plots over time draw, from above."""
+        signal = self._signal_shown(view)
+        if view.together:
+            return overlays.together(view.comparison, signal)
+        return overlays.compared(view.comparison, signal, view.recording)
+
+    def _lines(self, place: int) -> Lines | None:
+        found = self._every(self._view) if self._view is not None else []
+        return found[place] if place < len(found) else None
+
+    def _zoom(self, window_s: Window | None) -> None:
+        one = self._lines(0)
+        if one is not None:
+            self._window = clipped(window_s, one.every_time_s)
+            self._draw(self._time)
+
+    def _draw_time(self, view: View, draw: Callable[..., go.Figure], place: int) -> go.Figure:
+        if view.together:
+            figure = lines.drawn(self._every(view)[place], self._window)
+        else:
+            figure = draw(
+                view.comparison,
+                self._chosen(),
+                view.recording,
+                highlight=view.region,
+                moment_s=view.moment_s,
+                window_s=self._window,
+            )
+        if why_missing(figure):
+            return figure
+        times = self._every(view)[place].every_time_s[[0, -1]]
+        figure.update_xaxes(range=list(self._window or times))  # Plotly forgets nothing but what it is told anew
+        return marked(figure, self._time[place].handle)
 
     def _draw_against(self, view: View) -> go.Figure:
         variable = self._variables.get(str(self._variable.value), _FIRST)
@@ -220,8 +263,18 @@ class ComparePlots:
                     one.visible = seen
 
 
-def _marks(view: View) -> dict[str, Any]:
-    return {"highlight": view.region, "moment_s": view.moment_s}
+_TELLING = 0.25  # of a recording: an event shorter than that fills the plots by itself
+
+
+def telling_window(view: View) -> Window | None:
+    """What the plots over time show at first: a step's few per cent in which something happens; None: all."""
+    one = view.comparison.recordings[view.recording]
+    if view.together or view.comparison.residuals.is_map:
+        return None
+    window = overlays.event_of_recording(one)
+    if window is None or window[1] - window[0] > _TELLING * float(one.time_s[-1] - one.time_s[0]):
+        return None
+    return window
 
 
 # --- the comparison on the right: the answer in words, where the model fails, and the plots ---------------------------
@@ -233,6 +286,7 @@ _RESTING = (
 )
 _CHOSEN = "background:rgba(224,49,49,.14)!important;color:inherit!important;border-left:3px solid #e03131;"
 _CONFIG = {"displayModeBar": False, "responsive": False}
+_TOGETHER = "all, over each other"
 _PLAYING_REDRAW_S, _LEAST_MOVE_S = 1.0, 1e-4
 
 _STEPS = (
@@ -265,6 +319,7 @@ class ResultPanel:
         self._time_s = 0.0  # where the clock stood when the plots were drawn last
         self._region: Region | None = None
         self._preview: Any = None
+        self._mapped: list[Lines] = []  # what the preview draws
         self._buttons: list[Any] = []
         gui = page.server.gui
         add_html(gui, COLUMNS)
@@ -305,19 +360,33 @@ class ResultPanel:
         said = "as its columns are read"
         self._lines.show(opened)
         try:
-            figure, aspect = comparison_figures.mapped_columns(opened.columns, opened.mapping)
+            self._mapped = comparison_figures.mapped_lines(opened.columns, opened.mapping)
         except InputError as error:
             said = "no table is found in it" if opened.problem else str(error)
             if self._preview is not None:
                 self._preview.visible = False
         else:
-            if self._preview is None:
-                with self._place:
-                    self._preview = self._page.server.gui.add_plotly(figure, config=_CONFIG, aspect=aspect)
-            self._preview.figure, self._preview.aspect, self._preview.visible = figure, aspect, True
+            self._draw_preview(None)
         self._headline.content = html("<div {}><b>{}</b>, {}</div>", _BOX, opened.path.name, said)
         self._place.visible = True
         self._show_answer(False)
+
+    def _draw_preview(self, window_s: Window | None) -> None:
+        times = self._mapped[0].lines[0].time_s
+        over_time = self._mapped[0].time == "Time [s]" and bool(np.all(np.diff(times) > 0.0))  # which NaN is not
+        window_s = clipped(window_s, times) if over_time else None
+        figure, aspect = comparison_figures.mapped_columns(self._mapped, window_s)
+        if self._preview is None:
+            with self._place:
+                self._preview = self._page.server.gui.add_plotly(figure, config=_CONFIG, aspect=aspect)
+        if over_time:
+            rows = len(self._mapped)
+            self._page.measuring.add_rows(self._preview, rows, self._mapped_at, self._draw_preview)
+            marked(figure, self._preview, rows)
+        self._preview.figure, self._preview.aspect, self._preview.visible = figure, aspect, True
+
+    def _mapped_at(self, place: int) -> Lines | None:
+        return self._mapped[place] if place < len(self._mapped) else None
 
     def end_preview(self) -> None:
         """Back to the comparison, if there is one."""
@@ -355,8 +424,9 @@ class ResultPanel:
             self._list_regions(comparison)
             self.end_preview()
             names = [f"{i + 1}. {one.name}" for i, one in enumerate(comparison.recordings)]
-            self._recording.options, self._recording.value = names, names[0]
-            self._recording.visible = len(names) > 1
+            several = len(names) + len(comparison.holdout) > 1 and not comparison.residuals.is_map
+            self._recording.options = [*names, *([_TOGETHER] if several else [])]
+            self._recording.value, self._recording.visible = names[0], several or len(names) > 1
             self._kept.clear()
         self._put(0)
         self._plots.begin(View(comparison))
@@ -411,20 +481,30 @@ class ResultPanel:
 
     def _at(self) -> int:
         options = list(self._recording.options)
-        return options.index(self._recording.value) if self._recording.value in options else 0
+        return (
+            options.index(self._recording.value) if self._recording.value in options and not self._all_together() else 0
+        )
+
+    def _all_together(self) -> bool:
+        return self._recording.value == _TOGETHER
 
     def _chosen(self) -> None:
         def change() -> None:
             if self._comparison is not None:
                 self._put(self._at())
-                self._plots.show(View(self._comparison, self._at(), self._region))
+                self._plots.show(View(self._comparison, self._at(), self._region, together=self._all_together()))
 
         self._page.screen.post("recording shown", change)
 
     def _moved(self, on: str, time_s: float, _: tuple[float, float]) -> None:
         """The clock has moved: the charts' line follows, while it plays once a second, as drawing them takes long."""
         comparison = self._comparison
-        if on != WORKSPACE.name or comparison is None or abs(time_s - self._time_s) < _LEAST_MOVE_S:
+        if (
+            on != WORKSPACE.name
+            or comparison is None
+            or self._all_together()
+            or abs(time_s - self._time_s) < _LEAST_MOVE_S
+        ):
             return
         if self._strip.playback.playing and time.monotonic() - self._drawn_at < _PLAYING_REDRAW_S:
             return

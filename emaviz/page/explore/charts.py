@@ -15,8 +15,10 @@ from ema_model.recordings import write_measurement
 from emaviz.colours import GHOST, MONITOR, REFERENCE
 from emaviz.figures import runs
 from emaviz.figures.identification import LiveFan
+from emaviz.figures.lines import Window, clipped
 from emaviz.figures.runs import PHASE_SIGNALS, LivePhases, LiveSignals, differences, metrics, run_metrics_table
 from emaviz.page.explore import METRICS, PHASES, WORKSPACE
+from emaviz.page.measure import hint
 from emaviz.page.playback import PlaybackStrip
 from emaviz.page.style import TIME_CHARTS, WIDE_MODAL, play_head
 from emaviz.page.workspaces import Page
@@ -45,7 +47,7 @@ class ChartsPanel:
         self._page, self._slow = page, slow
         self._simulation: Simulation | None = None
         self.ghost: Simulation | None = None
-        self._window = (0.0, 1.0)  # shares of the run
+        self._window: Window | None = None  # that is shown, s; None: the whole run
         self._shown = 0  # how often a run or a part of it was to be shown
         self._drawn: dict[str, int] = {}  # which of them each of the other tabs holds
         gui = page.server.gui
@@ -58,14 +60,14 @@ class ChartsPanel:
             )
             self._melt = gui.add_button("Remove the frozen run", icon=viser.Icon.X, color="gray", visible=False)
             self.signals = LiveSignals(gui, page.session.actuator.axes, page.workspaces.heights.set_axes)
+            add_html(gui, hint())
             page.workspaces.heights.add(self.signals.handles, spare_px=-48)
-            self._range = gui.add_multi_slider(
-                "Shown [%]", 0, 100, 1, (0, 100), min_range=1, hint="Of the run; zooms all charts, in full resolution"
-            )
         with panel.add_tab(PHASES, viser.Icon.WAVE_SINE):
             add_html(gui, TIME_CHARTS)
             self._phases = LivePhases(gui)
             page.workspaces.heights.add(self._phases.handles)
+        page.measuring.add(self.signals.handles, self.signals.lines, self._zoom)
+        page.measuring.add(self._phases.handles, self._phases.lines, self._zoom)
         self.fan = FanView(page, panel)
         with panel.add_tab(METRICS, viser.Icon.TABLE):
             self._table: Any = add_html(gui)
@@ -73,13 +75,14 @@ class ChartsPanel:
             export(self)
         strip.moves.connect(self._moved)
         page.workspaces.in_front.came.connect(lambda _: slow.post("phases", self._draw_rest))
-        self._range.on_update(lambda _: page.screen.post("window", self._zoom))
         self._freeze.on_click(lambda _: page.screen.post("freeze", lambda: self._set_ghost(self._simulation)))
         self._melt.on_click(lambda _: page.screen.post("freeze", lambda: self._set_ghost(None)))
 
     def show(self, simulation: Simulation) -> None:
         """Draws a run; on the screen's thread."""
-        self._simulation = simulation
+        before, self._simulation = self._simulation, simulation
+        if before is not None and before.reference.duration_s != simulation.reference.duration_s:
+            self._set_window(None)
         self._shown += 1
         self._draw_signals(simulation)
         self._slow.post("phases", self._draw_rest)
@@ -89,9 +92,7 @@ class ChartsPanel:
         """From and to when the charts show the run."""
         if self._simulation is None:
             return 0.0, 1.0
-        reference = self._simulation.reference
-        low, high = self._window
-        return low * reference.duration_s, high * reference.duration_s
+        return self._window or (0.0, self._simulation.reference.duration_s)
 
     def _moved(self, on: str, time_s: float, _: tuple[float, float]) -> None:
         if on == FIRST:
@@ -116,7 +117,7 @@ class ChartsPanel:
     def _draw_phases(self, simulation: Simulation, ghost: Simulation | None) -> None:
         frozen = ghost.reference if ghost is not None else None
         if all(name in simulation.reference for name in PHASE_SIGNALS):
-            self._phases.show(simulation.reference, simulation.monitor, frozen, self.window_s)
+            self._phases.show(simulation.reference, simulation.monitor, frozen)
 
     def _draw_metrics(self, simulation: Simulation, ghost: Simulation | None) -> None:
         axes = self._page.session.actuator.axes
@@ -130,10 +131,14 @@ class ChartsPanel:
             errors["frozen run's"] = differences(ghost.reference, ghost.monitor, axes)
         self._table.content = run_metrics_table(runs, errors, [REFERENCE, MONITOR, GHOST], axes)
 
-    def _zoom(self) -> None:
-        low, high = (min(max(float(value), 0.0), 100.0) / 100.0 for value in self._range.value)
-        self._window = (low, high) if high > low else (0.0, 1.0)
-        self._redraw()
+    def _zoom(self, window_s: Window | None) -> None:
+        if self._simulation is not None:
+            self._set_window(clipped(window_s, self._simulation.reference.time_s))
+            self._redraw()
+
+    def _set_window(self, window_s: Window | None) -> None:
+        self._window = window_s
+        self._phases.zoom(window_s)
 
     def _set_ghost(self, simulation: Simulation | None) -> None:
         self.ghost = simulation
@@ -166,6 +171,7 @@ class FanView:
             self._note = add_html(gui, said(_ABOUT))
             self._charts = LiveFan(gui, page.session.actuator.axes)
             page.workspaces.heights.add(self._charts.handles, spare_px=-36)
+            page.measuring.add(self._charts.handles, self._charts.lines, self._charts.zoom)
         show.on_click(lambda _: self._ask())
         self._fault.on_update(lambda event: event.client and self._ask())
         page.session.events.fanned.connect(lambda fan: page.screen.post("fan", lambda: self._draw(fan)))

@@ -310,6 +310,7 @@ class IdentifyResult:
                 hint="The run that would tell them apart; then identify again",
             )
             self._fit = LiveFit(gui)
+            page.measuring.add(self._fit.handles, self._fit.lines, self._fit.zoom)
             page.workspaces.heights.add(self._fit.handles, spare_px=30)
         with panel.add_tab("Landscape", viser.Icon.MAP_2):
             standing.add(gui)

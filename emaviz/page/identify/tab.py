@@ -284,7 +284,7 @@ class IdentifyTab(Tab):
             shared.viewer,
             self.result,
             self._standing,
-            open_viewer=lambda url, name: shared.tab(RunsTab).result.open(url, name),
+            open_viewer=lambda url, name: shared.tab(RunsTab).follow(url, name),
             to_discover=partial(take_to_discover, self.page, shared.discovering),
         )
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib.metadata
 import os
 import secrets
 import shutil
@@ -73,8 +74,6 @@ def _write_fmu(order: Order) -> TargetProof:
 
 
 def _write_mjcf(order: Order) -> TargetProof:
-    import mujoco  # takes a while, and need not be there
-
     one, proof, progress = order.one, order.proof, order.progress
     cannot = mjcf.losses(shortened(proof, _MOST_STEPS), progress)
     joint, factors = mjcf.fitted(proof, mjcf.joint_of(one.actuator, one.rows), progress)
@@ -82,9 +81,8 @@ def _write_mjcf(order: Order) -> TargetProof:
     path = order.folder / f"{one.name}.xml"
     path.write_text(mjcf.document(one, joint, notes), encoding="utf-8")
     found = mjcf.replayed_in_mujoco(shortened(proof, _MOST_STEPS), factors, progress)
-    return TargetProof(
-        "mjcf", "MJCF", (path.name,), f"run in MuJoCo {mujoco.__version__}", tuple(found), tuple(cannot), tuple(notes)
-    )
+    checked = f"run in MuJoCo {importlib.metadata.version('mujoco')}"
+    return TargetProof("mjcf", "MJCF", (path.name,), checked, tuple(found), tuple(cannot), tuple(notes))
 
 
 def _write_python(order: Order) -> TargetProof:

@@ -37,7 +37,7 @@ def budget(proof: TargetProof, *, dark: bool = False) -> go.Figure | None:
     known = [one for one in proof.cannot_hold if math.isfinite(one.share)]
     if not known:
         return None
-    chart = theme.new(f"What {proof.title} cannot hold", "share of our error [%]", "", dark=dark)
+    chart = theme.new(f"What {proof.title} cannot hold", "Share of our error [%]", "", dark=dark)
     names, shares = [one.what for one in reversed(known)], [100.0 * one.share for one in reversed(known)]
     chart.add_trace(
         go.Bar(x=shares, y=names, orientation="h", marker={"color": _COLOUR}, hovertemplate="%{x:.3g} %<extra></extra>")

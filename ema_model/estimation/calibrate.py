@@ -374,9 +374,10 @@ def calibrate(
     start: x by name, from an earlier fit, from which alone this one begins.
     on_progress is told the evaluations so far, and may raise to stop.
     final: whether its intervals are told; else directions that are hardly known are not simulated for them.
-    rough: the start is near the end, and half a unit of χ² less would change nothing.
+    rough: the start is near the end, and half a unit of χ² less would change nothing; it is then not final.
     Raises InputError for a parameter that does not exist or has no tolerance.
     """
+    final = final and not rough
     problem = problem_of(model, floors, free=free, k=k, signals=signals)
     search = _Search(problem, on_progress, rough)
     fit = search.solve(start)
@@ -411,7 +412,7 @@ def calibrate(
         confounded=_confounded(problem.unknowns, covariance),
         identifiable=_products(problem, x, covariance, jacobian[: problem.values], fit.residual) if final else (),
         free=chosen,
-        is_final=final and not rough,
+        is_final=final,
     )
 
 

@@ -203,7 +203,7 @@ def fit(
 ) -> Fit:
     """Calibrates the base parameters but those held, those of the actuator's effects, and these faults together.
 
-    rough: as `calibrate` has it, and without intervals.
+    rough: as `calibrate` has it.
     """
     plant = data.plant(actuator)
     calibration = calibrate(
@@ -213,7 +213,6 @@ def fit(
         signals=data.signals,
         start=start,
         on_progress=None if tell is None else lambda evaluations: tell(f"fitting (simulations: {evaluations})"),
-        final=not rough,
         rough=rough,
     )
     names = [*calibration.parameters, *calibration.starts]

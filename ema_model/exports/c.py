@@ -160,7 +160,7 @@ class _Writer:
             case Choice(test=test, then=then, otherwise=otherwise):
                 text, own = f"{self.text(test, 1)} ? {self.text(then, 1)} : {self.text(otherwise, 1)}", 0
             case Call(function=function, arguments=arguments):
-                text, own = f"{function.name}({', '.join([*function.own, *map(self.text, arguments)])})", _HIGHEST
+                text, own = function.called(*map(self.text, arguments)), _HIGHEST
             case Part(of=of, index=index):
                 text, own = f"{self.text(of)}.v[{index}]", _HIGHEST
             case _:
@@ -254,7 +254,7 @@ def source(one: Exported) -> str:
     tuples = "\n".join(f"typedef struct {{ double v[{size}]; }} values{size};" for size in sorted(writer.sizes))
     defaults = "\n".join(f"    {_number(it.value)}, /* {it.name} */" for it in one.parameters)
     command = "command / p->torque_constant" if one.takes_torque else "command"
-    readings = (*(_call(entries[f"shown_{name}"]) for name in ("current", "speed", "angle")), "s->told")
+    readings = (*(entries[f"shown_{name}"].called() for name in ("current", "speed", "angle")), "s->told")
     shown = "\n".join(
         f"double {n}_{name}(const {n}_state *s, const {n}_parameters *p)\n{{\n    return {text};\n}}\n"
         for name, text in zip(SHOWN, readings)
@@ -293,23 +293,19 @@ void {n}_init({n}_state *s, const {n}_parameters *p, double user_position, doubl
 
 void {n}_sense({n}_state *s, const {n}_parameters *p)
 {{
-    {_call(entries["sense"])};
+    {entries["sense"].called()};
 }}
 
 void {n}_step({n}_state *s, const {n}_parameters *p, double command, double load, double supply, double dt)
 {{
     const double asked = {command};
-    const int driven = {_call(entries["is_driven"])};
+    const int driven = {entries["is_driven"].called()};
     if (driven)
-        {_call(entries["advance_demand"], "asked", "supply", "dt")};
-    {_call(entries["advance"], "asked", "load", "supply", "driven", "dt")};
+        {entries["advance_demand"].called("asked", "supply", "dt")};
+    {entries["advance"].called("asked", "load", "supply", "driven", "dt")};
 }}
 
 {shown}"""
-
-
-def _call(function: Function, *arguments: str) -> str:
-    return f"{function.name}({', '.join([*function.own, *arguments])})"
 
 
 def _helpers(body: str) -> str:

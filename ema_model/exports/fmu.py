@@ -135,15 +135,20 @@ def variables(one: Exported) -> list[tuple[int, str, Field]]:
     ]
 
 
-def _description3(one: Exported) -> str:
-    lines = ['    <Float64 name="time" valueReference="0" causality="independent" variability="continuous" unit="s"/>']
+def _attributes(one: Exported) -> list[tuple[str, str]]:
+    """Of each variable: what it is, and its unit and start, as XML's attributes, which FMI 2 and 3 spell alike."""
+    found = []
     for place, causality, field in variables(one):
         fixed = "fixed" if causality == "parameter" else "continuous"
         start = "" if causality == "output" else f' start="{_start(field.value)}"'
-        lines.append(
-            f'    <Float64 name="{field.name}" valueReference="{place}" causality="{causality}" '
-            f'variability="{fixed}"{_unit(field)}{start} description={quoteattr(field.meaning)}/>'
-        )
+        of = f'name="{field.name}" valueReference="{place}" causality="{causality}" variability="{fixed}"'
+        found.append((f"{of} description={quoteattr(field.meaning)}", f"{_unit(field)}{start}"))
+    return found
+
+
+def _description3(one: Exported) -> str:
+    lines = ['    <Float64 name="time" valueReference="0" causality="independent" variability="continuous" unit="s"/>']
+    lines += [f"    <Float64 {of}{number}/>" for of, number in _attributes(one)]
     outputs = [place for place, causality, _ in variables(one) if causality == "output"]
     return (
         _XML
@@ -167,15 +172,7 @@ def _description3(one: Exported) -> str:
 
 
 def _description2(one: Exported, sources: Sequence[str]) -> str:
-    lines = []
-    for place, causality, field in variables(one):
-        fixed = "fixed" if causality == "parameter" else "continuous"
-        start = "" if causality == "output" else f' start="{_start(field.value)}"'
-        lines.append(
-            f'    <ScalarVariable name="{field.name}" valueReference="{place}" causality="{causality}" '
-            f'variability="{fixed}" description={quoteattr(field.meaning)}>'
-            f"<Real{_unit(field)}{start}/></ScalarVariable>"
-        )
+    lines = [f"    <ScalarVariable {of}><Real{number}/></ScalarVariable>" for of, number in _attributes(one)]
     outputs = [number for number, (_, causality, _) in enumerate(variables(one), 1) if causality == "output"]
     unknowns = _joined([f'      <Unknown index="{number}"/>' for number in outputs])
     files = _joined([f'      <File name="{name}"/>' for name in sources])

@@ -139,6 +139,10 @@ class Function:
         """ "s" and "p", those that it takes, in this order."""
         return tuple(one for one in ("s", "p") if one in self.reads)
 
+    def called(self, *arguments: str) -> str:
+        """A call of it, as C and Python spell it alike."""
+        return f"{self.name}({', '.join([*self.own, *arguments])})"
+
 
 @dataclass(frozen=True, eq=False)
 class Program:

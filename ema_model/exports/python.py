@@ -116,7 +116,7 @@ def _text(one: Expression, binding: int = 0) -> str:
         case Choice(test=test, then=then, otherwise=otherwise):
             text = f"where({_text(test)}, {_text(then)}, {_text(otherwise)})"
         case Call(function=function, arguments=arguments):
-            text = f"{function.name}({', '.join([*function.own, *map(_text, arguments)])})"
+            text = function.called(*map(_text, arguments))
         case Part(of=of, index=index):
             text = f"{_text(of)}[{index}]"
         case _:
@@ -305,26 +305,26 @@ def source(one: Exported) -> str:
     asked = "command / p.torque_constant" if one.takes_torque else "command"
     calls = {
         "asked": asked,
-        "sense": _call(entries["sense"]),
-        "is_driven": _call(entries["is_driven"]),
-        "advance_demand": _call(entries["advance_demand"], "asked", "supply", "dt"),
-        "advance": _call(entries["advance"], "asked", "load", "supply", "driven", "dt"),
+        "sense": entries["sense"].called(),
+        "is_driven": entries["is_driven"].called(),
+        "advance_demand": entries["advance_demand"].called("asked", "supply", "dt"),
+        "advance": entries["advance"].called("asked", "load", "supply", "driven", "dt"),
     }
     if "torsional_compliance" not in one.actuator.effects and "half_play" in {it.name for it in one.parameters}:
         part = shown_part(entries["advance"], "resisting", _OF_TORQUE)
         functions.append(part)
         states = next((it for it in functions if it.name == "advance_states"), None)
         torque = _TORQUE.format(
-            part=_call(part, "asked", "0.0", "supply", "driven", "dt"),
+            part=part.called("asked", "0.0", "supply", "driven", "dt"),
             advance_states="pass"
             if states is None
-            else _call(
-                states, "dt", "s.theta", "s.omega", "gear * before", "gear * s.play", "gear * (s.play - before)",
+            else states.called(
+                "dt", "s.theta", "s.omega", "gear * before", "gear * s.play", "gear * (s.play - before)",
                 "gear", "load", "active", "static", "dynamic",
             ),
             **calls,
         )  # fmt: skip
-    readings = (*(_call(entries[f"shown_{name}"]) for name in ("current", "speed", "angle")), "s.told")
+    readings = (*(entries[f"shown_{name}"].called() for name in ("current", "speed", "angle")), "s.told")
     shown = "\n".join(f'            "{out.name}": {text},  # {out.unit}' for out, text in zip(one.outputs, readings))
     about = "\n".join([f"{one.given.name}: {one.given.description}".rstrip(": "), *one.notes])
     return (
@@ -345,10 +345,6 @@ def source(one: Exported) -> str:
         )
         + torque
     )
-
-
-def _call(function: Function, *arguments: str) -> str:
-    return f"{function.name}({', '.join([*function.own, *arguments])})"
 
 
 def _of(one: Field) -> str:

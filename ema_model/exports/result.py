@@ -10,6 +10,7 @@ from typing import Annotated, TypedDict
 import numpy as np
 from msgspec import Meta
 
+from ema_model.comparison.result import plain
 from ema_model.exports.exported import Exported
 from ema_model.exports.replay import EXACT, RecordingLoss, SignalLoss
 from ema_model.quantities.axes import Axes, of_signal
@@ -97,13 +98,10 @@ def document_of(result: Export) -> Document:
 def first_line(result: Export) -> str:
     """'Thesis EMA is exported to out: C, Python.'."""
     titles = all_of([proof.title for proof in result.targets])
-    on = (
-        "a run made for it"
-        if result.simulated
-        else all_of(list(result.names))
-        if len(result.names) < 4
-        else (f"{len(result.names)} recordings")
-    )
+    if result.simulated:
+        on = "a run made for it"
+    else:
+        on = all_of(result.names) if len(result.names) < 4 else f"{len(result.names)} recordings"
     return f"{result.one.given.name} is exported to {result.folder} as {titles}, replayed on {on}."
 
 
@@ -218,7 +216,7 @@ class ExportJson(TypedDict):
 
 def as_dict(result: Export) -> ExportJson:
     """The fields of --json."""
-    return {
+    found: ExportJson = {
         "name": result.one.given.name,
         "folder": result.folder,
         "input": result.one.command.name,
@@ -227,6 +225,7 @@ def as_dict(result: Export) -> ExportJson:
         "notes": list(result.one.notes),
         "export": {proof.target: _target(proof, result) for proof in result.targets},
     }
+    return plain(found)
 
 
 def _target(proof: TargetProof, result: Export) -> TargetJson:
@@ -241,7 +240,7 @@ def _target(proof: TargetProof, result: Export) -> TargetJson:
         "ratio": max(ratios) if ratios else None,
         "difference": proof.difference,
         "real_time": proof.real_time,
-        "cannot_hold": [{"what": one.what, "share": _finite(one.share)} for one in proof.cannot_hold],
+        "cannot_hold": [{"what": one.what, "share": one.share} for one in proof.cannot_hold],
         "notes": [*switches(proof), *proof.notes],
         "recordings": [_recording(loss, result) for loss in proof.recordings],
     }
@@ -256,15 +255,11 @@ def _recording(loss: RecordingLoss, result: Export) -> RecordingLossJson:
         "switch": loss.switch,
         "signals": {
             result.axes.signal(name): {
-                "rmse": None if result.simulated else _finite(one.rmse),
-                "rmse_ours": None if result.simulated else _finite(one.rmse_ours),
+                "rmse": None if result.simulated else one.rmse,
+                "rmse_ours": None if result.simulated else one.rmse_ours,
                 "difference": one.difference,
-                "begins_s": _finite(one.begins_s),
+                "begins_s": one.begins_s,
             }
             for name, one in signals.items()
         },
     }
-
-
-def _finite(value: float) -> float | None:
-    return value if math.isfinite(value) else None

@@ -65,10 +65,9 @@ class Parser(argparse.ArgumentParser):
                 continue
             options.append(text)
             name, equals, _ = text.partition("=")
-            known = [action for option, action in self._option_string_actions.items() if option == name] or [
-                action for option, action in self._option_string_actions.items() if option.startswith(name)
-            ]
-            if known and known[0].nargs is None and not equals and rest:
+            every = self._option_string_actions
+            action = every.get(name) or next((every[option] for option in every if option.startswith(name)), None)
+            if action is not None and action.nargs is None and not equals and rest:
                 options.append(rest.pop(0))
         return [*options, *others]
 

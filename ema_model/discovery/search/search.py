@@ -261,7 +261,8 @@ class Search(Walk):
         names = {one.name for one in telling}
         orders = sorted({one.fingerprint.settings["order"] for one in telling if "order" in one.fingerprint.settings})
         present = found.actuator.effects
-        story.looked_for([name for name in CATALOGUE if name in names and name not in present], orders)
+        ours = [name for name in story.of_the_file if name in present]  # beyond their tolerances
+        story.looked_for([*(name for name in CATALOGUE if name in names), *ours], orders)
         terms = terms_of(story.data, found, [*story.prints, *_further_orders(story, orders)], noise, shown)
         return terms + [one for one in known if one.name not in names and one.name not in present]
 

@@ -270,12 +270,13 @@ class Story:
         fits = [step.fit for step in self.steps[-2:]]
         before, after = (floor_ratio(self.data, one.plant, one.calibration.signals) for one in fits)
         moves_otherwise = before > FAR and after < HALF * before
+        data, held = self.data, self.held
         if moves_otherwise:
-            self.data = self.data.beside(last.fit)
-            self.held = None if self.held is None else self.held.beside(last.fit)
-        found = fit(self.data, last.fit.actuator, last.fit.starts, tell, last.fit.faults)
+            data, held = data.beside(last.fit), None if held is None else held.beside(last.fit)
+        found = fit(data, last.fit.actuator, last.fit.starts, tell, last.fit.faults)  # tell may raise to stop
         self.steps.pop()
         if moves_otherwise:
+            self.data, self.held = data, held
             self._tell_in_floors_of(found)
         self._append(found, self._rung(last.rung.change, found), last.added)
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Annotated, TypedDict, TypeVar, cast
+from typing import TYPE_CHECKING, Annotated, TypedDict
 
 import numpy as np
 from msgspec import Meta
@@ -26,7 +26,7 @@ from ema_model.estimation.calibrate import (
     together,
 )
 from ema_model.quantities.axes import ROTARY, SIGNALS, Axes, of_residual, of_signal
-from ema_model.quantities.numbers import IntervalJson, Quantity, number
+from ema_model.quantities.numbers import IntervalJson, Quantity, number, plain
 from ema_model.quantities.titles import all_of, in_sentence
 from ema_model.quantities.variables import of_variable
 from ema_model.recordings.health import HealthJson
@@ -327,8 +327,6 @@ def _why(result: Comparison) -> Iterator[Table | Lines | Note]:
 
 # --- a comparison in plain numbers, as `emaviz compare --json` writes it ----------------------------------------------
 # What each field means, and where it is from.
-
-_Value = TypeVar("_Value")
 
 
 class SignalErrorJson(TypedDict):
@@ -645,18 +643,3 @@ def parameter_dict(one: Calibrated) -> ParameterJson:
         "z": one.z,
         "at_bound": one.at_bound,
     }
-
-
-def plain(value: _Value) -> _Value:
-    """The value in types that JSON has; numbers that are not finite are None."""
-    return cast(_Value, _plain(value))
-
-
-def _plain(value: object) -> object:
-    if isinstance(value, dict):
-        return {key: _plain(one) for key, one in value.items()}
-    if isinstance(value, list | tuple):
-        return [_plain(one) for one in value]
-    if isinstance(value, np.generic):
-        value = value.item()
-    return None if isinstance(value, float) and not np.isfinite(value) else value

@@ -27,7 +27,6 @@ from ema_model.comparison.result import (
     event_dict,
     free_simulation,
     parameter_dict,
-    plain,
     simulation_dict,
 )
 from ema_model.comparison.verdict import ORDER_OF_PRIMARY
@@ -42,7 +41,7 @@ from ema_model.estimation import Calibrated
 from ema_model.estimation.calibrate import CombinationJson, combinations, together
 from ema_model.faults import BY_NAME, FAULTS, NAMES, cause_of, causes, vector
 from ema_model.quantities.axes import Axes, of_signal
-from ema_model.quantities.numbers import IntervalJson, Quantity, amount, number, with_uncertainty
+from ema_model.quantities.numbers import IntervalJson, Quantity, amount, number, plain, with_uncertainty
 from ema_model.quantities.sides import USER
 from ema_model.quantities.titles import all_of, in_sentence
 from ema_model.simulation.run import run_in_words
@@ -305,6 +304,13 @@ def added(found: Discovery) -> Iterator[Facts]:
 
 
 _STRAIN_WAVE = 1.0 / 30.0  # gear ratio, from which on a single stage is usually a strain wave gear's
+
+
+def _of_order(one: Added, axes: Axes) -> str:
+    """' of order 24', or along a linear motor ' of pitch 2.50 mm'."""
+    for order in _orders_of(one):
+        return f" of pitch {amount(2.0 * math.pi / order, 'm')}" if axes.motor == "linear" else f" of order {order:g}"
+    return ""
 
 
 def _orders_of(one: Added) -> list[float]:
@@ -1037,7 +1043,9 @@ def sentences(found: Discovery) -> list[str]:
             rivals = all_of([in_sentence(effect_title(name)) for name in one.same_as])
             told.append(f"These recordings cannot tell {in_sentence(effect_title(one.name))} from {rivals}.")
         if one.probability is not None:
-            this = "one of these" if one.same_as else in_sentence(effect_title(one.name))
+            several = sum(other.name == one.name for other in found.effects) > 1
+            order = _of_order(one, found.actuator.axes) if several else ""
+            this = "one of these" if one.same_as else f"{in_sentence(effect_title(one.name))}{order}"
             told.append(f"That {this} is missing is {in_percent(one.probability)} probable.")
     if found.parameters_outside_tolerance:
         outside = all_of([_beside_file(found, path) for path in found.parameters_outside_tolerance])

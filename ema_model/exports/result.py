@@ -10,10 +10,10 @@ from typing import Annotated, TypedDict
 import numpy as np
 from msgspec import Meta
 
-from ema_model.comparison.result import plain
 from ema_model.exports.exported import Exported
 from ema_model.exports.replay import EXACT, RecordingLoss, SignalLoss
 from ema_model.quantities.axes import Axes, of_signal
+from ema_model.quantities.numbers import plain
 from ema_model.quantities.titles import all_of
 from ema_model.text import Document, InWords, Lines, Note, Table
 

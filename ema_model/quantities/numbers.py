@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Annotated, Any
+from typing import Annotated, Any, TypeVar, cast
 
 import numpy as np
 from msgspec import Meta
@@ -165,3 +165,23 @@ def amount(value: float, unit: str) -> str:
         if shown.unit.startswith("10"):
             return f"{number(shown.factor * value)}·{shown.unit}"
     return shown.text(value)
+
+
+# --- numbers as JSON has them -----------------------------------------------------------------------------------------
+
+_Value = TypeVar("_Value")
+
+
+def plain(value: _Value) -> _Value:
+    """The value in types that JSON has; numbers that are not finite are None."""
+    return cast(_Value, _plain(value))
+
+
+def _plain(value: object) -> object:
+    if isinstance(value, dict):
+        return {key: _plain(one) for key, one in value.items()}
+    if isinstance(value, list | tuple):
+        return [_plain(one) for one in value]
+    if isinstance(value, np.generic):
+        value = value.item()
+    return None if isinstance(value, float) and not np.isfinite(value) else value

@@ -1,10 +1,13 @@
 """The search by one evidence: its algebra, and that it names what is hidden and nothing else."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 from support.hidden_effects import ACTUATOR, SINE, recorded
 
 from ema_model.discovery import as_dict, discover
+from ema_model.discovery.search import search
 from ema_model.discovery.search.evidence import Unknowns, evidence_of, gains_of
 from ema_model.errors import InputError
 from ema_model.estimation.noise import PIECE, NoiseModel
@@ -109,6 +112,25 @@ def test_a_hidden_effect_is_named_with_how_probable_it_is():
     probable = [one["probability"] for one in document["candidates"]]
     assert probable == sorted(probable, reverse=True) and sum(probable) < 1.0 + 1e-9
     assert "That cogging torque is missing is > 99.9 % probable." in str(found)
+
+
+def test_what_promises_more_than_the_refitted_is_refitted_too(monkeypatch):
+    """A delay that looks best by algebra, and is nothing once refitted, hides no other."""
+    gains = {"best": 25.0, "next": 14.0, "third": 4.0, "hopeless": 1.0}
+    terms = [
+        SimpleNamespace(term=SimpleNamespace(fingerprint=object(), log_share=0.0), gain=g, candidate=n)
+        for n, g in gains.items()
+    ]
+    real = {"best": -1.0, "next": 12.0, "third": 3.0}
+    story = SimpleNamespace(added=(), data=None, held=None)
+    of = search.Search(story, lambda text: None, None, 3)
+    monkeypatch.setattr(of, "_round", lambda: seen)
+    seen = SimpleNamespace(best=terms, beside=None, before=0.0, noise=None)
+    monkeypatch.setattr(
+        search, "fits", lambda job, chosen, tell: [SimpleNamespace(fit=one.candidate) for one in chosen]
+    )
+    monkeypatch.setattr(search, "probability_of_fit", lambda data, held, fit, noise: (real[fit], 0.0))
+    assert [(one.trial.fit, one.gain) for one in of._contenders()] == [("next", 12.0), ("best", -1.0)]
 
 
 @pytest.mark.long

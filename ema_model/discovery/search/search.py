@@ -272,12 +272,18 @@ class Search(Walk):
         if self._refitted is None or self._refitted[0] is not seen:
             is_full = len({one.name for one in story.added}) >= self._most
             room = [one for one in seen.best if one.term.fingerprint is None or not is_full]
-            chosen = [one for one in room if one.gain > max(_LEAST_SCORE, _MIGHT * room[0].gain)][:_REFITTED]
-            trials = fits(lambda one, tell: refitted(story.data, seen.beside, one, tell), chosen, self._tell)
-            found = []
-            for one, trial in zip(chosen, trials):
-                log, density = probability_of_fit(story.data, story.held, trial.fit, seen.noise)
-                found.append(Contender(trial, log - seen.before + one.term.log_share, density))
+            found: list[Contender] = []
+            best = -math.inf
+            while len(found) < _REFITTED:
+                left = [one for one in room[len(found) :] if one.gain > max(_LEAST_SCORE, best)]
+                chosen = [one for one in left if one.gain > _MIGHT * left[0].gain][: _REFITTED - len(found)]
+                if not chosen:
+                    break
+                trials = fits(lambda one, tell: refitted(story.data, seen.beside, one, tell), chosen, self._tell)
+                for one, trial in zip(chosen, trials):
+                    log, density = probability_of_fit(story.data, story.held, trial.fit, seen.noise)
+                    found.append(Contender(trial, log - seen.before + one.term.log_share, density))
+                best = max(one.gain for one in found)  # what promises more than this is refitted, too
             self._refitted = seen, sorted(found, key=lambda one: -one.gain)
         return self._refitted[1]
 

@@ -57,9 +57,9 @@ def run(arguments: argparse.Namespace) -> int:
 
     def compute(fitted: list[Measurement], held: list[Measurement], progress: output.Progress) -> flow.Answer:
         # These take a second: recordings are refused before.
-        from ema_model.comparison.result import plain
         from ema_model.discovery import as_dict, discover, verified
         from ema_model.discovery.words import verification
+        from ema_model.quantities.numbers import plain
 
         with PartialAnswer() as answer:
             found = discover(

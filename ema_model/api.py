@@ -296,8 +296,8 @@ def discover(
     holdout: Recordings = (),
     signals: Sequence[str] | None = None,
     candidates: Sequence[str] | None = None,
-    most_effects: int = 3,
-    engine: str = "steps",
+    most_effects: int = 100,
+    engine: str = "evidence",
     on_progress: Callable[[str], None] | None = None,
     stop: Callable[[], bool] | None = None,
 ) -> Discovery:

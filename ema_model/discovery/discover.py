@@ -48,8 +48,8 @@ def discover(
     holdout: Sequence[Measurement] = (),
     signals: Sequence[str] | None = None,
     candidates: Sequence[str] | None = None,
-    most_effects: int = 3,
-    engine: str = "steps",
+    most_effects: int = 100,
+    engine: str = "evidence",
     on_progress: Progress | None = None,
     stop: Callable[[], bool] | None = None,
 ) -> Discovery:

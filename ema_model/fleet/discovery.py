@@ -41,8 +41,8 @@ def discover_units(
     *,
     holdout: _Units | None = None,
     signals: Sequence[str] | None = None,
-    most_effects: int = 3,
-    engine: str = "steps",
+    most_effects: int = 100,
+    engine: str = "evidence",
     seed: int = 0,
     on_progress: Progress | None = None,
 ) -> UnitsDiscovered:

@@ -136,7 +136,7 @@ def _pushed() -> Measurement:
     time = np.arange(0.0, 3.0, 2e-3)
     position = 3.0 * np.sin(2.0 * np.pi * 0.7 * time) + 1.5 * np.sin(2.0 * np.pi * 1.9 * time)
     speed = np.gradient(position, time)
-    torque = 1e-4 * np.gradient(speed, time) + 0.01 * np.sign(speed) + 0.006 * np.sin(12.0 * position + 0.4)
+    torque = 1e-4 * np.gradient(speed, time) + 0.01 * np.sign(speed) + 0.003 * np.sin(12.0 * position + 0.4)
     current = torque / 0.05 + 0.01 * random.standard_normal(len(time))
     return Measurement({"time_s": time, "motor_position_rad": position, "current_A": current})
 

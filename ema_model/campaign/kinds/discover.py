@@ -56,8 +56,8 @@ class Settings:
     """As `emaviz discover` has them."""
 
     signals: str = "all"
-    most_effects: int = 3
-    engine: str = "steps"
+    most_effects: int = 100
+    engine: str = "evidence"
     showable_from: float = 0.0  # of χ²: hidden effects that change the recordings by less are not looked for
 
     def __post_init__(self) -> None:

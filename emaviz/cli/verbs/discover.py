@@ -25,11 +25,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     options.add_units(parser)
     options.add_fit(parser, "the discovery")
     parser.add_argument("--signals", choices=("current", "all"), default="all", help="what is fitted")
-    parser.add_argument("--max-effects", type=whole(0, 100), default=3, metavar="N", help="at most so many are added")
+    parser.add_argument("--max-effects", type=whole(0, 100), default=100, metavar="N", help="at most so many are added")
     parser.add_argument(
         "--engine",
         choices=("steps", "evidence"),
-        default="steps",
+        default="evidence",
         help="refit what fits best and ask what speaks against it, or (new) compare how probable models are",
     )
     options.add_open_loop(parser)

@@ -19,6 +19,7 @@ from ema_model.discovery.candidates.preview import preview as room_for
 from ema_model.discovery.candidates.refit import Trial
 from ema_model.discovery.candidates.unknown import curve_for
 from ema_model.discovery.result import Experiment
+from ema_model.discovery.search.search import Search
 from ema_model.discovery.steps.snapshot import Look
 from ema_model.discovery.steps.step import Step
 from ema_model.discovery.words import effect_title, verification
@@ -338,7 +339,7 @@ class Discovering:
                 if self._shown.is_behind:
                     self._shown.show(told)  # a step further: the ladder grows
 
-            walk(told.story, say)
+            walk(told.story, say, most_effects=100, engine=Search)
             self._shown.assess(told, tell)
 
         return self.job.begin("Finding all that is missing", job)

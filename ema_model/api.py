@@ -27,7 +27,7 @@ from ema_model.actuator import Actuator
 from ema_model.commands import command as command_of
 from ema_model.comparison import Comparison
 from ema_model.discovery import Discovery
-from ema_model.discovery.steps.begin import with_fitted_effects
+from ema_model.discovery.begin import with_fitted_effects
 from ema_model.effects import find
 from ema_model.errors import InputError, quoted
 from ema_model.exports import export as exporting
@@ -297,7 +297,6 @@ def discover(
     signals: Sequence[str] | None = None,
     candidates: Sequence[str] | None = None,
     most_effects: int = 100,
-    engine: str = "evidence",
     on_progress: Callable[[str], None] | None = None,
     stop: Callable[[], bool] | None = None,
 ) -> Discovery:
@@ -309,8 +308,6 @@ def discover(
     signals: names of signals to fit; current and positions without it.
     candidates: names of the effects to consider; all of `emaviz effects` without it.
     most_effects: how many are added at most.
-    engine: "steps" refits what fits best and asks what speaks against it; "evidence" compares how probable models are,
-    and says so.  The second is new.
     on_progress: takes a text that says what goes on; what it raises ends the discovery.
     stop: is asked as often, once the model is calibrated; where it is true, what was added so far is the answer.
     """
@@ -322,7 +319,6 @@ def discover(
         signals=signals,
         candidates=candidates,
         most_effects=most_effects,
-        engine=engine,
         on_progress=on_progress,
         stop=stop,
     )

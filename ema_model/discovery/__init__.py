@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
+from ema_model.discovery.begin import begun
 from ema_model.discovery.discover import discover, result_of, settings_of
+from ema_model.discovery.history import Story
 from ema_model.discovery.result import Added, Candidate, Discovery, Experiment, Rung
-from ema_model.discovery.steps.begin import begun
-from ema_model.discovery.steps.path import Story
-from ema_model.discovery.steps.walking import walk
+from ema_model.discovery.search import search
 from ema_model.discovery.verify import Verified, verified
 from ema_model.discovery.words import as_dict
 
@@ -22,7 +22,7 @@ __all__ = [
     "begun",
     "discover",
     "result_of",
+    "search",
     "settings_of",
     "verified",
-    "walk",
 ]

@@ -1,8 +1,4 @@
-"""Which physical effects are missing: calibrate, ask whether anything is left, score, refit, accept, repeat.
-
-The method and what was measured on a prototype: no verdict without a converged calibration; an effect is accepted
-when the data pay for its parameters (ΔBIC), on most stretches of time, materially, and on what was held out.
-"""
+"""Which physical effects are missing: calibrate, look at all Terms, add the most probable, repeat; and the verdict."""
 
 from __future__ import annotations
 
@@ -11,30 +7,23 @@ from dataclasses import replace
 
 from ema_model.actuator import Actuator, load_actuator
 from ema_model.comparison.explain import Explanation
-from ema_model.discovery.candidates.next_experiment import next_experiment
-from ema_model.discovery.evidence.outside_tolerance import outside_tolerance
-from ema_model.discovery.evidence.remaining import left_by
-from ema_model.discovery.evidence.uncertainty import with_intervals
+from ema_model.discovery.begin import begun
+from ema_model.discovery.history import Story, refreshed
+from ema_model.discovery.inverse import other_loop, support_of
+from ema_model.discovery.next_experiment import next_experiment
 from ema_model.discovery.observed.repeated import repeated
-from ema_model.discovery.result import Candidate, Discovery, Experiment, errors_of
-from ema_model.discovery.search.search import Search
-from ema_model.discovery.steps.begin import begun
-from ema_model.discovery.steps.path import Story
-from ema_model.discovery.steps.second_opinion import other_loop, support_of
-from ema_model.discovery.steps.step import refreshed
-from ema_model.discovery.steps.verdict import explains_all, verdict_of
-from ema_model.discovery.steps.walking import Walk, named_in, walk
+from ema_model.discovery.remaining import lasts, left_by, silence, within_band
+from ema_model.discovery.result import Added, Candidate, Discovery, Experiment, errors_of, misses_unseen
+from ema_model.discovery.search import NO_LIMIT, search
+from ema_model.discovery.uncertainty import outside_tolerance, with_intervals
 from ema_model.discovery.verify import free_simulation
 from ema_model.discovery.words import as_well, held_back, mismatch, untold
 from ema_model.effects import CATALOGUE
-from ema_model.errors import InputError, did_you_mean, quoted
+from ema_model.errors import InputError, quoted
 from ema_model.quantities.numbers import as_number
 from ema_model.recordings import Measurement
 
 Progress = Callable[[str], None]
-
-
-ENGINES: Mapping[str, type[Walk]] = {"steps": Walk, "evidence": Search}
 
 
 class _Stopped(Exception):
@@ -48,8 +37,7 @@ def discover(
     holdout: Sequence[Measurement] = (),
     signals: Sequence[str] | None = None,
     candidates: Sequence[str] | None = None,
-    most_effects: int = 100,
-    engine: str = "evidence",
+    most_effects: int = NO_LIMIT,
     on_progress: Progress | None = None,
     stop: Callable[[], bool] | None = None,
 ) -> Discovery:
@@ -58,12 +46,8 @@ def discover(
     holdout: recordings that are not fitted and must improve as well; candidates: effects to consider, all of the
     catalogue's without it.  on_progress is told what goes on, and may raise to stop.  stop() is asked as often once
     the model is calibrated; where it is true, what was added so far is the answer, with the verdict "interrupted".
-    engine: of `ENGINES`, how it goes on.
     Raises InputError for recordings that cannot be compared.
     """
-    if engine not in ENGINES:
-        like = did_you_mean(engine, ENGINES)
-        raise InputError(f"no engine {quoted(engine, 40)!r}; there are {', '.join(ENGINES)}{like}")
     if not as_number(most_effects) >= 0.0:
         raise InputError(f"most_effects must be a number from 0 on, not {quoted(repr(most_effects), 40)}")
     progress = on_progress or (lambda text: None)
@@ -81,17 +65,17 @@ def discover(
         return result_of(story)
     try:
         go_on()
-        walked = walk(story, tell, candidates=candidates, most_effects=most_effects, engine=ENGINES[engine])
+        found = search(story, tell, candidates=candidates, most_effects=most_effects)
         experiment = None
-        if walked.rivals:
+        if found.rivals:
             tell("looking for a test that tells the rivals apart")
-            first, second = walked.rivals[:2]
+            first, second = found.rivals[:2]
             experiment = next_experiment(story.data, first, second)
             if experiment is None:
                 story.warnings.append(untold(first.candidate.name, second.candidate.name))
     except _Stopped:
         return result_of(story, interrupted=True)
-    return result_of(story, walked.candidates, walked.unknown, experiment)
+    return result_of(story, found.candidates, found.unknown, experiment)
 
 
 def result_of(
@@ -105,7 +89,7 @@ def result_of(
     """What a story comes to; unknown: what its last model leaves; interrupted: before its end."""
     calibration = with_intervals(story.data, story.current)
     events = left_by(story.data, story.without_curve).events
-    names = named_in(story)
+    names = story.named
     added = [
         replace(refreshed(one, calibration), supported_by=support_of(story, one.name), **errors_of(story.ladder, one))
         for one in story.added
@@ -159,3 +143,30 @@ def result_of(
 def settings_of(found: Discovery) -> Mapping[str, Mapping[str, float]]:
     """The effects of the improved model, as `compare` and `simulate` take them."""
     return {one.key: found.actuator.effects[one.key] for one in found.effects}
+
+
+# --- the verdict, bound to its ladder: nothing is said that the error does not bear out -------------------------------
+
+
+def verdict_of(story: Story, named: Sequence[Added], unknown: Explanation | None, interrupted: bool = False) -> str:
+    """One of `VERDICTS`; named: the library's effects in the last model; unknown: what the last model leaves."""
+    if interrupted:
+        return "interrupted"
+    if not story.repeatable:
+        return "not_repeatable"
+    done = explains_all(story) and story.transmission_seen is None
+    if named:
+        return "effects_found" if done else "partly_explained"
+    if silence(story.data, story.current):
+        return "uninformative"
+    if not story.base.calibration.converged and not story.added:
+        return "not_converged"  # an unfinished fit looks exactly like missing physics
+    if done:
+        noise = unknown is None and not lasts(story.data, story.current)
+        return "adequate" if noise else "unknown_effect"
+    return "partly_explained" if story.added else "unknown_effect"
+
+
+def explains_all(story: Story) -> bool:
+    """Whether what is left may be noise and the model's floor: within its band, and not far off what was not fitted."""
+    return within_band(story.data, story.current) and not misses_unseen(story.ladder[-1], story.disagreements)

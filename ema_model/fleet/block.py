@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ema_model.actuator import Actuator
-from ema_model.discovery.evidence.counted import colour
+from ema_model.discovery.uncertainty import colour
 from ema_model.estimation import Floor, calibrate, default_free, floor
 from ema_model.estimation.floor import POSITIONS
 from ema_model.estimation.model_fit import Data

@@ -42,14 +42,12 @@ def discover_units(
     holdout: _Units | None = None,
     signals: Sequence[str] | None = None,
     most_effects: int = 100,
-    engine: str = "evidence",
     seed: int = 0,
     on_progress: Progress | None = None,
 ) -> UnitsDiscovered:
     """The recordings of several units of one type, by the units' names.
 
-    holdout: recordings that are not fitted, by which each unit's effects are confirmed; most_effects: of a unit;
-    engine: as `discover` has it.
+    holdout: recordings that are not fitted, by which each unit's effects are confirmed; most_effects: of a unit.
     Raises InputError for one unit only, and for recordings that cannot be compared.
     """
     tell = on_progress or (lambda text: None)
@@ -64,7 +62,6 @@ def discover_units(
             signals=signals,
             candidates=candidates,
             most_effects=most,
-            engine=engine,
             on_progress=lambda text: tell(f"{name}: {text}"),
         )
 

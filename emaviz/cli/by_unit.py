@@ -61,7 +61,6 @@ def run_discovery(arguments: argparse.Namespace, actuator: Actuator, signals: tu
             holdout=held,
             signals=signals,
             most_effects=arguments.max_effects,
-            engine=arguments.engine,
             seed=arguments.seed,
             on_progress=progress.show,
         )

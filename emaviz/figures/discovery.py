@@ -18,7 +18,7 @@ from ema_model.comparison.explain import Explanation
 from ema_model.comparison.residuals import Residuals
 from ema_model.discovery import Candidate, Discovery
 from ema_model.discovery.result import Added
-from ema_model.discovery.steps.snapshot import Look
+from ema_model.discovery.snapshot import Look
 from ema_model.discovery.words import Track, effect_title, faults, page_of, rung_title, settings
 from ema_model.effects import Effect, find
 from ema_model.effects.effect import STAGES

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from ema_model.discovery.candidates.harmonics import Further
-from ema_model.discovery.candidates.refit import Trial
+from ema_model.discovery.refit import Trial
 from ema_model.discovery.result import Added, Candidate
 from ema_model.discovery.steps import claim, dropped
 

@@ -12,7 +12,7 @@ from ema_model.actuator import load_actuator, save_actuator
 from ema_model.actuator.parameters import Controller, Inverter
 from ema_model.comparison.explain import Explanation, explain
 from ema_model.comparison.residuals import Residuals, residuals_of
-from ema_model.discovery.candidates.torque_curve import curve_of, is_torque, with_curve
+from ema_model.discovery.curve import curve_of, is_torque, with_curve
 from ema_model.effects import find
 from ema_model.effects.user import torque_curve, user_torque
 from ema_model.errors import InputError

@@ -12,7 +12,7 @@ from ema_model.comparison.explain import colour as around_orders
 from ema_model.discovery.candidates.harmonics import _stands_out
 from ema_model.discovery.candidates.paid_for import _lasts
 from ema_model.discovery.criteria import LEAST_BIC
-from ema_model.discovery.evidence.counted import colour, evidence
+from ema_model.discovery.uncertainty import colour, evidence
 
 RANDOM = np.random.default_rng(5)
 N = 8000

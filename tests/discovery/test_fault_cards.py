@@ -9,9 +9,9 @@ from ema_model.actuator import load_actuator
 from ema_model.commands import command
 from ema_model.comparison.criteria import BAND
 from ema_model.discovery import as_dict, begun, discover, result_of
-from ema_model.discovery.candidates.next_experiment import next_experiment
+from ema_model.discovery.next_experiment import next_experiment
 from ema_model.discovery.result import Candidate, Change
-from ema_model.discovery.steps.snapshot import assessed
+from ema_model.discovery.snapshot import assessed
 from ema_model.discovery.words import PAGES, candidates, effect_title, rung_label, rung_title, size, typical
 from ema_model.faults import BY_NAME, CAUSES, vector
 from ema_model.quantities.axes import ROTARY

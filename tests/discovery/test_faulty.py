@@ -12,7 +12,7 @@ from ema_model.discovery import discover
 from ema_model.discovery.candidates.faults import scored_faults, tried_faults
 from ema_model.discovery.discover import result_of
 from ema_model.discovery.result import Change
-from ema_model.discovery.steps.begin import begun
+from ema_model.discovery.begin import begun
 from ema_model.discovery.words import as_dict
 from ema_model.estimation.model_fit import holdout_error
 from ema_model.faults import vector

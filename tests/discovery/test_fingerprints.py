@@ -8,7 +8,7 @@ from ema_model.actuator import load_actuator
 from ema_model.commands import command
 from ema_model.discovery.candidates import fingerprints
 from ema_model.discovery.candidates.score import scored
-from ema_model.discovery.steps.begin import begun
+from ema_model.discovery.begin import begun
 from ema_model.recordings.measurement import Sensors
 from ema_model.simulation.run import Run, simulate_reference
 

@@ -7,7 +7,7 @@ from support.hidden_effects import ACTUATOR, recorded
 
 from ema_model.commands import command
 from ema_model.discovery import discover
-from ema_model.discovery.candidates.fingerprints import variants
+from ema_model.discovery.fingerprints import variants
 from ema_model.discovery.words import sentences
 from ema_model.effects import CATALOGUE, find
 from ema_model.recordings.measurement import Sensors

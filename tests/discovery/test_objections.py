@@ -9,7 +9,7 @@ import pytest
 
 from ema_model.actuator import Tolerance
 from ema_model.discovery.evidence import objections
-from ema_model.discovery.evidence.stability import disagreement
+from ema_model.discovery.objections import disagreement
 from ema_model.effects import find
 from ema_model.estimation import Calibrated
 from ema_model.quantities.axes import ROTARY

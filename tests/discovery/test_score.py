@@ -9,7 +9,7 @@ import pytest
 
 from ema_model.actuator import load_actuator
 from ema_model.discovery.candidates import score
-from ema_model.discovery.candidates.fingerprints import Fingerprint
+from ema_model.discovery.fingerprints import Fingerprint
 from ema_model.effects import find
 
 

@@ -8,7 +8,7 @@ from support.hidden_effects import ACTUATOR, SINE, recorded
 
 from ema_model.discovery import as_dict, discover
 from ema_model.discovery.search import search
-from ema_model.discovery.search.evidence import Unknowns, evidence_of, gains_of
+from ema_model.discovery.evidence import Unknowns, evidence_of, gains_of
 from ema_model.errors import InputError
 from ema_model.estimation.noise import PIECE, NoiseModel
 

@@ -11,9 +11,9 @@ from support.hidden_effects import ACTUATOR, SINE, recorded
 from ema_model.commands import command
 from ema_model.comparison.compare import weights_of
 from ema_model.discovery import discover
-from ema_model.discovery.candidates.fingerprints import fingerprints
-from ema_model.discovery.candidates.next_experiment import allowed, next_experiment
-from ema_model.discovery.candidates.refit import Trial
+from ema_model.discovery.fingerprints import fingerprints
+from ema_model.discovery.next_experiment import allowed, next_experiment
+from ema_model.discovery.refit import Trial
 from ema_model.discovery.candidates.score import scored, scored_together
 from ema_model.discovery.observed.repeatability import is_lost, with_divergence
 from ema_model.discovery.result import Candidate

@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 
 from ema_model.actuator import load_actuator
-from ema_model.discovery.candidates.fingerprints import Fingerprint, variants
-from ema_model.discovery.candidates.refit import Trial
+from ema_model.discovery.fingerprints import Fingerprint, variants
+from ema_model.discovery.refit import Trial
 from ema_model.discovery.candidates.score import scored_all
 from ema_model.discovery.result import Candidate
 from ema_model.discovery.steps import walking
-from ema_model.discovery.steps.path import Story
+from ema_model.discovery.history import Story
 from ema_model.effects import find
 
 

@@ -17,7 +17,6 @@ from ema_model.campaign.plan_axes import TaskInputs
 from ema_model.comparison.compare import weights_of
 from ema_model.comparison.criteria import BAND
 from ema_model.discovery import as_dict, discover
-from ema_model.discovery.discover import ENGINES
 from ema_model.errors import InputError, quoted
 from ema_model.estimation.calibrate import problem_of
 from ema_model.estimation.model_fit import fit, gather
@@ -57,21 +56,18 @@ class Settings:
 
     signals: str = "all"
     most_effects: int = 100
-    engine: str = "evidence"
     showable_from: float = 0.0  # of χ²: hidden effects that change the recordings by less are not looked for
 
     def __post_init__(self) -> None:
         if self.signals not in _SIGNALS:
             raise InputError(f"no signals {quoted(self.signals)!r}; there are {', '.join(_SIGNALS)}")
-        if self.engine not in ENGINES:
-            raise InputError(f"no engine {quoted(self.engine)!r}; there are {', '.join(ENGINES)}")
         if not 0 <= self.most_effects <= 100:
             raise InputError(f"most_effects is a whole number from 0 to 100, not {self.most_effects}")
 
 
 def _run(inputs: TaskInputs, settings: Settings, seed: int) -> dict[str, Any]:
     signals = _SIGNALS[settings.signals]
-    asked: dict[str, Any] = {"signals": settings.signals, "engine": settings.engine, "showable": None}
+    asked: dict[str, Any] = {"signals": settings.signals, "showable": None}
     if settings.showable_from > 0.0 and inputs.effects:
         asked["showable"] = showable(inputs.fitted, inputs.actuator, inputs.effects, signals)
         if asked["showable"] < settings.showable_from:
@@ -83,7 +79,6 @@ def _run(inputs: TaskInputs, settings: Settings, seed: int) -> dict[str, Any]:
             holdout=inputs.held,
             signals=signals,
             most_effects=settings.most_effects,
-            engine=settings.engine,
         )
     )
     ladder, faults, experiment = found["ladder"], found["faults"], found["next_experiment"]
@@ -154,7 +149,6 @@ KIND = Kind(
     columns=pa.schema(
         [
             ("signals", TEXT),
-            ("engine", TEXT),
             ("showable", NUMBER),  # expected fall of χ²; null where it was not asked for
             ("verdict", TEXT),  # null where the effects cannot be seen
             ("effects", TEXTS),

@@ -26,12 +26,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     options.add_fit(parser, "the discovery")
     parser.add_argument("--signals", choices=("current", "all"), default="all", help="what is fitted")
     parser.add_argument("--max-effects", type=whole(0, 100), default=100, metavar="N", help="at most so many are added")
-    parser.add_argument(
-        "--engine",
-        choices=("steps", "evidence"),
-        default="evidence",
-        help="refit what fits best and ask what speaks against it, or (new) compare how probable models are",
-    )
     options.add_open_loop(parser)
     options.add_seed(parser)
 
@@ -68,7 +62,6 @@ def run(arguments: argparse.Namespace) -> int:
                 holdout=held,
                 signals=signals,
                 most_effects=arguments.max_effects,
-                engine=arguments.engine,
                 on_progress=progress.show,
                 stop=answer.is_interrupted,
             )

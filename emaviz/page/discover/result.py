@@ -13,7 +13,7 @@ import viser
 
 from ema_model.commands import command
 from ema_model.discovery.result import Experiment
-from ema_model.discovery.steps.snapshot import Look
+from ema_model.discovery.snapshot import Look
 from ema_model.discovery.words import (
     FLOOR_NOTE,
     Track,

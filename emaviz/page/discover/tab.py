@@ -12,7 +12,7 @@ from ema_model.actuator import Actuator
 from ema_model.challenges import Challenge
 from ema_model.discovery import Candidate
 from ema_model.discovery.result import Experiment
-from ema_model.discovery.steps.snapshot import Look
+from ema_model.discovery.snapshot import Look
 from ema_model.discovery.words import effect_title, rung_title
 from ema_model.effects import CATALOGUE
 from ema_model.errors import InputError

@@ -12,16 +12,14 @@ from typing import Any
 import numpy as np
 
 from ema_model.actuator import save_actuator
-from ema_model.discovery import Candidate, Story, verified, walk
-from ema_model.discovery.candidates.next_experiment import next_experiment
-from ema_model.discovery.candidates.preview import Preview as Room
-from ema_model.discovery.candidates.preview import preview as room_for
-from ema_model.discovery.candidates.refit import Trial
-from ema_model.discovery.candidates.unknown import curve_for
+from ema_model.discovery import Candidate, Story, search, verified
+from ema_model.discovery.history import Step
+from ema_model.discovery.next_experiment import next_experiment
+from ema_model.discovery.preview import Preview as Room
+from ema_model.discovery.preview import preview as room_for
+from ema_model.discovery.refit import Trial
 from ema_model.discovery.result import Experiment
-from ema_model.discovery.search.search import Search
-from ema_model.discovery.steps.snapshot import Look
-from ema_model.discovery.steps.step import Step
+from ema_model.discovery.snapshot import Look
 from ema_model.discovery.words import effect_title, verification
 from ema_model.effects import CATALOGUE
 from ema_model.effects.user import Expression, UserEffect, parse
@@ -307,9 +305,11 @@ class Discovering:
             raise InputError("no variable explains the residual, so that there is no curve to add")
 
         def job(tell: Tell) -> None:
-            trial = curve_for(story.data, story.held, story.current, left, tell)
+            trial = story.curve(left, tell)
             if trial is None:
-                raise InputError("a torque curve does not pay here: the error would not fall, or only by chance")
+                raise InputError(
+                    "a torque curve makes these recordings no more probable: the error would fall by chance alone"
+                )
             self._shown.take(told, trial, (), tell)
 
         return self.job.begin("Adding the curve", job)
@@ -330,7 +330,7 @@ class Discovering:
         return self.job.begin(f"Removing {in_sentence(effect_title(key))}", job)
 
     def find_all(self) -> bool:
-        """Adds what pays, a step after another, as `emaviz discover` does."""
+        """Adds all that is missing, a step after another, as `emaviz discover` does."""
         told, _ = self._seen()
 
         def job(tell: Tell) -> None:
@@ -339,7 +339,7 @@ class Discovering:
                 if self._shown.is_behind:
                     self._shown.show(told)  # a step further: the ladder grows
 
-            walk(told.story, say, most_effects=100, engine=Search)
+            search(told.story, say, known=told.search)
             self._shown.assess(told, tell)
 
         return self.job.begin("Finding all that is missing", job)

@@ -16,10 +16,11 @@ from ema_model.actuator.write import as_toml
 from ema_model.challenges import Challenge
 from ema_model.comparison.explain import Explanation
 from ema_model.discovery import Candidate, Story, begun, result_of
-from ema_model.discovery.candidates.refit import Trial, with_drops
+from ema_model.discovery.history import Step
+from ema_model.discovery.refit import Trial, with_drops
 from ema_model.discovery.result import Experiment
-from ema_model.discovery.steps.snapshot import Assessment, Look, assessed, known_of, look_at
-from ema_model.discovery.steps.step import Step
+from ema_model.discovery.search import Search
+from ema_model.discovery.snapshot import Assessment, Look, assessed, known_of, look_at
 from ema_model.discovery.words import effect_title
 from ema_model.effects import CATALOGUE, catalogue_name
 from ema_model.errors import InputError
@@ -177,8 +178,12 @@ class Telling:
     recipe: Recipe  # of its recordings
     known: dict[Step, Assessment] = field(default_factory=dict)  # so that a step back is at once
     trials: Trials = field(default_factory=Trials)  # so that nothing is fitted twice
+    search: Search = field(init=False)  # that has looked at its models
     first: Sequence[Candidate] = ()  # of the first search, with what their refits gave
     experiment: Experiment | None = None
+
+    def __post_init__(self) -> None:
+        self.search = Search(self.story)
 
     @property
     def is_assessed(self) -> bool:
@@ -187,12 +192,19 @@ class Telling:
 
     def assess(self) -> None:
         """Looks at what the last model leaves; takes a second, and the first time a compilation."""
-        found = self.known[self.story.steps[-1]] = assessed(self.story)
+        found = self.known[self.story.steps[-1]] = assessed(self.story, self.search)
         self.first = self.first or found.candidates
 
-    def add(self, trial: Trial, alike: Sequence[str]) -> None:
-        """Takes a trial for the next model; alike: effects and faults that cannot be told from it."""
+    def add(self, trial: Trial, alike: Sequence[str], tell: Tell) -> None:
+        """Takes a trial for the next model, fitted to its end; alike: what cannot be told from it."""
+        known = self.known.get(self.story.steps[-1])
         self.story.add(trial, ties=alike)
+        if known is not None and not trial.faults:
+            names = {trial.candidate.name, *alike}
+            told = [one.probability or 0.0 for one in known.candidates if one.name in names]
+            if told:
+                self.story.set_probability(min(1.0, sum(told)))
+        self.story.finish(tell)
         if self.first and trial.candidate.predicted_drop:
             self.first = with_drops(self.first, [trial])
 
@@ -341,7 +353,7 @@ class Shown:
         """A trial into the model; alike: effects that cannot be told from it."""
         check_value(trial)
         tell("measuring the new model's error")  # the last moment to stop
-        told.add(trial, alike)
+        told.add(trial, alike, tell)
         self.assess(told, tell)
 
     def assess(self, told: Telling, tell: Tell) -> None:

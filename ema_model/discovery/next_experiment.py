@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from ema_model.actuator import Actuator
 from ema_model.commands import command
-from ema_model.discovery.candidates.refit import Trial
+from ema_model.discovery.refit import Trial
 from ema_model.discovery.result import Experiment
 from ema_model.estimation import default_free
 from ema_model.estimation.calibrate import problem_of

@@ -2,32 +2,35 @@
 
 A model that meets what it was fitted to and misses by far what it was not has met a recording of something else.  Each
 cheap explanation is tried by putting the recording right and simulating it anew; what brings the error down is told.
+
+Where a held-out recording's encoder is turned, mirrored or shifted, what depends on an angle stands elsewhere in it, so
+that it seems to deny what the fitted recordings show.  It is put right by that itself: the turn at which the model, as
+it was fitted, takes from its error what it must.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ema_model.actuator.parameters import on_axes
-from ema_model.discovery.criteria import ANOTHER, MISSED, PUT_RIGHT, WIDER
-from ema_model.discovery.evidence.objections import ratio
+from ema_model.discovery.criteria import ANOTHER, MISSED, PUT_RIGHT, SHARED, WIDER
+from ema_model.discovery.history import Story
+from ema_model.discovery.remaining import ratio
 from ema_model.discovery.result import Contradiction
+from ema_model.effects import catalogue_name, find
 from ema_model.errors import InputError
 from ema_model.estimation import calibrate
-from ema_model.estimation.model_fit import Data, Fit, fit, floor_ratio, gather, resimulated
+from ema_model.estimation.model_fit import Data, Fit, fit, floor_ratio, gather, holdout_change, resimulated
 from ema_model.quantities.axes import Axes, of_signal
 from ema_model.quantities.numbers import amount, number
 from ema_model.quantities.titles import in_sentence
 from ema_model.recordings import Measurement
-
-if TYPE_CHECKING:
-    from ema_model.discovery.steps.path import Story
 
 Array = NDArray[np.float64]
 
@@ -36,6 +39,11 @@ _POSITIONS = ("user_position_rad", "motor_position_rad")
 _DEGREES = ("degrees", 180.0 / math.pi)
 _THOUSAND = 1e3
 _CLOSE = 6.0  # times, within which a ratio of sizes may be that of two units: motions differ, too
+_BY_ANGLE = frozenset({"motor_angle", "user_position"})
+_A_PERIOD = 12  # turns that are tried within a period
+_MOST_TRIED = 720  # of one recording; a map is simulated in milliseconds
+_MIRRORED = 1.5  # times, by which the error must be less with an angle that is mirrored as well
+_FINER = (0.5, 0.25, 0.125, 0.0625)  # of the first step, to which the best one is then sought
 
 
 @dataclass(frozen=True, eq=False)
@@ -175,3 +183,126 @@ def alone_of(held: Data, found: Fit, place: int) -> Data | None:
     return (
         replace(held, measurements=measurements, stretches=stretches, floors=floors, after_fit=()) if floors else None
     )
+
+
+# --- a held-out recording whose encoder is turned: put right by what depends on the angle -----------------------------
+
+
+class _Turn(NamedTuple):
+    by_rad: float  # that the motor's angle is greater by
+    is_mirrored: bool
+
+
+def goes_by_angle(key: str) -> bool:
+    """Whether an effect, by its key in a model, stands elsewhere where the encoder is turned."""
+    return find(catalogue_name(key)).against in _BY_ANGLE
+
+
+def put_right(story: Story, found: Fit, keys: Sequence[str], tell: Callable[[str], None]) -> bool:
+    """Turns the held-out recordings that deny effects, by their keys in a fit, only where they stand.
+
+    The story goes on with them as they are read then, and says so among its disagreements.  Returned is whether any was
+    turned.
+    """
+    if story.held is None or story.current.plant.simulates_commands:
+        return False
+    turned, held = [], list(story.held.measurements)
+    for place, measurement in enumerate(held):
+        tell(f"asking whether the encoder of {measurement.name} is turned")
+        right = _turned_back(story, found, keys, place)
+        if right is not None:
+            held[place], contradiction = right
+            turned.append(contradiction)
+    if turned:
+        names = {one.recording for one in turned}
+        story.hold_out(replace(story.held, measurements=held))
+        story.turned = [*(one for one in story.turned if one.recording not in names), *turned]
+    return bool(turned)
+
+
+def _turned_back(story: Story, found: Fit, keys: Sequence[str], place: int) -> tuple[Measurement, Contradiction] | None:
+    """A held-out recording as its encoder must be read for a fit, and what is said of it; None where none does."""
+    assert story.held is not None
+    alone, bare = alone_of(story.held, found, place), alone_of(story.held, story.current, place)
+    if alone is None or bare is None:
+        return None
+    (measurement,) = alone.measurements
+    without = resimulated(bare, story.current.calibration.actuator)[0]
+    as_it_is = _error(alone, found, measurement)
+    by_angle = [key for key in keys if goes_by_angle(key)]
+    after, best = _best_turn(alone, found, by_angle, measurement)
+    # What is true takes as much from the square of the error as it changes.
+    change = holdout_change(bare, story.current, found)
+    if after >= as_it_is or without**2 - after**2 < SHARED * change**2:
+        return None
+    name = measurement.name or "the held-out recording"
+    said = (
+        f"{name} contradicts the fitted recordings: with {in_sentence(find(catalogue_name(by_angle[0])).title)} it is "
+        f"off by {number(as_it_is, 2)} times the floor, and by {number(after, 2)} with its encoder "
+        f"{_in_words(_orders_of(found, by_angle), best)}."
+    )
+    how = "sign" if best.is_mirrored else "zero"
+    return _turned(measurement, best, found), Contradiction(name, "motor_position_rad", how, said, as_it_is, after)
+
+
+def _orders_of(found: Fit, keys: Sequence[str]) -> list[float]:
+    return [found.actuator.effects[key].get("order", 1.0) for key in keys]
+
+
+def _in_words(orders: Sequence[float], turn: _Turn) -> str:
+    """'turned by 90°, or by 30° more or less, as often as one likes'."""
+    by = math.remainder(turn.by_rad, 2.0 * math.pi)
+    degrees = f"{number(math.degrees(abs(by)), 3)}°"
+    parts = ["mirrored"] if turn.is_mirrored else []
+    if not turn.is_mirrored or abs(by) > 1e-6:
+        parts.append(f"turned by {degrees} {'forward' if by >= 0.0 else 'backward'}")
+    again = ""
+    if len(set(orders)) == 1 and orders[0] > 1.0:
+        again = f" (or by any number of {number(360.0 / orders[0], 3)}° more, after which it repeats)"
+    return " and ".join(parts) + again
+
+
+def _best_turn(alone: Data, found: Fit, keys: Sequence[str], measurement: Measurement) -> tuple[float, _Turn]:
+    """The least error of a fit over all turns, in floors, and the turn."""
+    step, turns = _turns(_orders_of(found, keys))
+    errors = [(_error(alone, found, _turned(measurement, turn, found)), turn) for turn in turns]
+    # One wave alone, mirrored, is the same as turned.
+    least, best = min(errors, key=lambda one: one[0] * (_MIRRORED if one[1].is_mirrored else 1.0))
+    for share in _FINER:
+        for sign in (-1.0, 1.0):
+            turn = best._replace(by_rad=best.by_rad + sign * share * step)
+            error = _error(alone, found, _turned(measurement, turn, found))
+            if error < least:
+                least, best = error, turn
+    return least, best
+
+
+def _turns(orders: Sequence[float]) -> tuple[float, Iterator[_Turn]]:
+    """The step between the turns that are tried, rad, and all of them.
+
+    Within one period where nothing else in the model tells the angle, else over a whole turn.
+    """
+    highest = max([1.0, *orders])
+    span = 2.0 * math.pi / (highest if len(set(orders)) == 1 else 1.0)
+    count = min(_MOST_TRIED // 2, _A_PERIOD * math.ceil(span * highest / (2.0 * math.pi) - 1e-9))
+    step = span / count
+    mirrors = (False, True)
+    return step, (_Turn(step * n, mirrored) for mirrored in mirrors for n in range(count))
+
+
+def _turned(measurement: Measurement, turn: _Turn, found: Fit) -> Measurement:
+    """The recording with the encoder's angle so much greater, or mirrored before; the user's goes along."""
+    sign = -1.0 if turn.is_mirrored else 1.0
+    gear = found.actuator.transmission.gear_ratio
+    by = {"motor_position_rad": turn.by_rad, "user_position_rad": gear * turn.by_rad, "motor_speed_rad_s": 0.0}
+    changed = {name: sign * measurement[name] + more for name, more in by.items() if name in measurement}
+    return measurement.with_signals(**changed)
+
+
+def _error(alone: Data, found: Fit, measurement: Measurement) -> float:
+    """Of one recording, in floors."""
+    try:
+        error = resimulated(replace(alone, measurements=[measurement]), found.calibration.actuator)[0]
+    except (InputError, FloatingPointError):
+        return math.inf
+    return error if np.isfinite(error) else math.inf

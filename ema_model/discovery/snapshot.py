@@ -11,13 +11,11 @@ from numpy.typing import NDArray
 
 from ema_model.comparison.explain import Explanation
 from ema_model.comparison.residuals import Residuals, residuals_of
-from ema_model.discovery.candidates.alike import alike
-from ema_model.discovery.criteria import LEAST_BIC
-from ema_model.discovery.evidence.remaining import Left
+from ema_model.discovery.criteria import WORTH_A_LOOK
+from ema_model.discovery.history import Step, Story
+from ema_model.discovery.remaining import Left
 from ema_model.discovery.result import Added, Candidate, Discovery
-from ema_model.discovery.steps.path import Story
-from ema_model.discovery.steps.ranking import signatures, with_faults
-from ema_model.discovery.steps.step import Step
+from ema_model.discovery.search import Search
 from ema_model.discovery.words import primary
 from ema_model.effects import find
 from ema_model.faults import BY_NAME, causes
@@ -26,6 +24,8 @@ from ema_model.quantities.numbers import HALF_90
 Array = NDArray[np.float64]
 
 _RIVAL = 25.0  # of χ², below which a candidate is too faint to be taken for another
+_SAME_CHI2 = 25.0  # between two of them, below which they cannot be told apart
+_SAME_DIRECTION = 1.0 - 0.98**2  # sin² between their signatures, likewise
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,7 +76,7 @@ class Look:
     @staticmethod
     def is_worth(one: Candidate) -> bool:
         """Whether so much would hardly be chance."""
-        return one.predicted_drop > LEAST_BIC
+        return one.predicted_drop > WORTH_A_LOOK
 
     def predicted_rmse(self, one: Candidate) -> float:
         """The error with a candidate in the model, in floors, before any refit."""
@@ -135,14 +135,32 @@ class Look:
         return np.concatenate(parts) if parts else None
 
 
-def assessed(story: Story) -> Assessment:
-    """What the last model of a story leaves; takes a second, and the first time a compilation."""
-    left = story.left()
-    ranked = with_faults(story, story.ranked())
-    worth = [one for one in ranked if not one.obstacle]
-    found = signatures(story, worth)
-    rivals = {one.name: found[one.name] for one in worth if one.predicted_drop > _RIVAL and one.name in found}
-    return Assessment(left, ranked, found, alike(rivals))
+def assessed(story: Story, search: Search | None = None) -> Assessment:
+    """What the last model of a story leaves; takes a second or two, and the first time a compilation.
+
+    search: one that has looked at earlier models of it.
+    """
+    left, seen = story.left(), (search or Search(story)).round()
+    candidates = seen.candidates()
+    changes = {one.candidate.name: one.change for one in seen.best if one.change is not None}
+    worth = {one.name for one in candidates if not one.obstacle and one.predicted_drop > _RIVAL}
+    return Assessment(left, candidates, changes, _alike({name: its for name, its in changes.items() if name in worth}))
+
+
+def _alike(signatures: Mapping[str, Array]) -> dict[str, tuple[str, ...]]:
+    """Effects and faults whose signatures no refit is expected to tell apart, by name."""
+    return {
+        name: tuple(other for other, its in signatures.items() if other != name and _same(own, its))
+        for name, own in signatures.items()
+    }
+
+
+def _same(one: Array, other: Array) -> bool:
+    first, second, shared = one @ one, other @ other, one @ other
+    if min(first, second) == 0.0:
+        return False
+    apart = 1.0 - max(shared, 0.0) ** 2 / (first * second)
+    return bool(apart < _SAME_DIRECTION or max(first, second) * apart < _SAME_CHI2)
 
 
 def known_of(step: Step, known: Mapping[Step, Assessment]) -> Assessment | None:

@@ -13,16 +13,14 @@ from ema_model.actuator import Actuator, Tolerance
 from ema_model.actuator.parameters import INVERSE_PLACES
 from ema_model.comparison.criteria import BAND, MISSED
 from ema_model.comparison.loop_lag import LoopLag
-from ema_model.discovery.candidates.paid_for import pays
-from ema_model.discovery.criteria import APART, GONE, HALF, HEARD, LOOP_TOLD, MUCH_BETTER
-from ema_model.discovery.evidence.objections import ratio
-from ema_model.discovery.evidence.remaining import at_floor
-from ema_model.discovery.evidence.uncertainty import with_intervals
+from ema_model.discovery.begin import calibrated_story
+from ema_model.discovery.criteria import APART, GONE, HALF, HEARD, LOOP_TOLD, MUCH_BETTER, NAMED
+from ema_model.discovery.history import Story
 from ema_model.discovery.observed.controller import ControllerSeen, controller_seen
 from ema_model.discovery.observed.repeatability import by_inverse_dynamics
+from ema_model.discovery.remaining import at_floor, ratio
 from ema_model.discovery.result import Added, Candidate, Change
-from ema_model.discovery.steps.begin import calibrated_story
-from ema_model.discovery.steps.path import Story
+from ema_model.discovery.uncertainty import with_intervals
 from ema_model.discovery.words import LOOP_UNTOLD
 from ema_model.effects import CATALOGUE, find
 from ema_model.errors import InputError
@@ -149,7 +147,7 @@ def compared(story: Story, opinion: Opinion, tell: Callable[[str], None]) -> Non
             continue
         here, seen = mine.parameters[path], there.parameters[its]
         if abs(seen.value - here.value) <= max(APART * abs(here.value), _half(here) + _half(seen)):
-            if pays(other.current, trial, other.data, other.held):
+            if other.gain(trial.fit) > NAMED:
                 story.support[one.name] = (CLOSED_LOOP, INVERSE_DYNAMICS)
         elif heard and abs(seen.value) + _half(seen) < GONE * abs(here.value):
             story.refused[one.name] = "the motion and the current alone, without the controller, show none of it"

@@ -1,6 +1,6 @@
 """How a model grows: from the calibrated one, an effect a step, each with its error; steps can be taken back.
 
-`discover` walks by itself; a person at the page takes the same steps by hand.
+A search takes steps by itself; a person at the page takes the same by hand.
 """
 
 from __future__ import annotations
@@ -9,38 +9,92 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import takewhile
 
-import numpy as np
-from numpy.typing import NDArray
-
 from ema_model.actuator.file import cannot_represent
 from ema_model.comparison.explain import Explanation
 from ema_model.comparison.loop_lag import LoopLag
-from ema_model.discovery.candidates.faults import fault_for, fault_trial, tried_faults, without_fault
-from ema_model.discovery.candidates.fingerprints import Fingerprint, fingerprints, may_act, of_the_file
-from ema_model.discovery.candidates.refit import Trial, again, is_near, promising, stands_for, tried
-from ema_model.discovery.candidates.score import scored, signatures
-from ema_model.discovery.candidates.unknown import curve_for
-from ema_model.discovery.criteria import FAR, HALF, LEAST_BIC
-from ema_model.discovery.evidence.counted import predicted_evidence
-from ema_model.discovery.evidence.remaining import Left, at_floor, left_by
-from ema_model.discovery.evidence.uncertainty import settled
+from ema_model.discovery.criteria import FAR, HALF, NAMED
+from ema_model.discovery.curve import curve_trial
+from ema_model.discovery.fingerprints import Fingerprint, fingerprints, may_act, of_the_file
 from ema_model.discovery.observed.controller import ControllerSeen
 from ema_model.discovery.observed.transmission import TransmissionSeen
 from ema_model.discovery.observed.two_masses import TwoMasses
-from ema_model.discovery.result import Added, Candidate, Change, Contradiction, Rung
-from ema_model.discovery.steps.step import Step, change_of, refreshed, rung_of, stood_in
-from ema_model.effects import CATALOGUE, catalogue_name, find
-from ema_model.estimation.model_fit import Data, Fit, as_in, fit, floor_ratio, in_floors_of, without_effect
+from ema_model.discovery.refit import Trial, refitted, stands_for, without_fault
+from ema_model.discovery.remaining import Left, at_floor, left_by
+from ema_model.discovery.result import Added, Candidate, Change, Contradiction, Rung, StoodIn
+from ema_model.discovery.scoring import evidence_of_fit
+from ema_model.discovery.terms import noise_of
+from ema_model.discovery.uncertainty import settled
+from ema_model.effects import CATALOGUE, catalogue_name
+from ema_model.estimation import Calibration
+from ema_model.estimation.model_fit import (
+    Data,
+    Fit,
+    as_in,
+    fit,
+    floor_ratio,
+    holdout_fit,
+    in_floors_of,
+    ratio_by_recording,
+    rms_by_signal,
+    without_effect,
+)
 from ema_model.faults import NAMES as FAULTS
 from ema_model.faults import cause_of
-from ema_model.side_by_side import fits
 from ema_model.simulation.compiled import compile_behind
 
 Progress = Callable[[str], None]
-Array = NDArray[np.float64]
 
-_LEADS = 0.5  # of the greatest fall of χ², from which on a trial is refitted from the file's values, too
+_MOVED = 1.5  # σ that a parameter comes back by, when it had been standing in for an effect
 _MOST_PITCHES = 8  # along a linear motor, each of which is simulated
+
+
+@dataclass(frozen=True, eq=False)
+class Step:
+    """A model on the way: its fit, its rung of the ladder, and the effects that were added so far."""
+
+    fit: Fit
+    rung: Rung
+    added: tuple[Added, ...]
+    settled_from: Step | None = None  # the same before its fit was settled, or its errors were told in other floors
+
+
+def change_of(trial: Trial, parameter: str) -> Change:
+    """What a step that adds this changes; parameter: the path of the one that it stands for."""
+    if trial.faults:
+        return Change("fault", trial.faults)
+    name = trial.candidate.name
+    if parameter:
+        return Change("parameter", (parameter,))
+    orders = tuple(values["order"] for key, values in trial.effects.items() if key != name and "order" in values)
+    return Change("effect", (name,), orders)
+
+
+def rung_of(change: Change, found: Fit, data: Data, held: Data | None) -> Rung:
+    """A fit's errors, with those of what was held out."""
+    shown = found.calibration.signals
+    ratio, rms = floor_ratio(data, found.plant, shown), rms_by_signal(data, found.plant, shown)
+    each = ratio_by_recording(data, found.plant, shown)
+    unseen, unseen_rms, unseen_each = (None, {}, {}) if held is None else holdout_fit(held, found)
+    return Rung(change, ratio, unseen, rms, unseen_rms, shown, each, unseen_each)
+
+
+def stood_in(before: Fit, after: Fit) -> tuple[StoodIn, ...]:
+    """Parameters that came back toward the file's value."""
+    moved = []
+    for path, one in before.calibration.parameters.items():
+        now = after.calibration.parameters[path]
+        if not path.startswith("effects.") and abs(one.z) - abs(now.z) > _MOVED:
+            moved.append(StoodIn(path, one.z, now.z))
+    return tuple(moved)
+
+
+def refreshed(one: Added, calibration: Calibration) -> Added:
+    """With the values of a calibration."""
+    path = f"effects.{one.key}."
+    fitted = {name.removeprefix(path): value for name, value in calibration.parameters.items() if name.startswith(path)}
+    settings = calibration.actuator.effects[one.key]
+    chosen = {name: value for name, value in settings.items() if name not in fitted}
+    return replace(one, parameters=fitted, chosen=chosen)
 
 
 @dataclass
@@ -62,7 +116,6 @@ class Story:
     disagreements: list[Contradiction] = field(default_factory=list)  # of held-out recordings
     turned: list[Contradiction] = field(default_factory=list)  # the same of those whose encoder was put right
     _calm: dict[Fit, Fit] = field(default_factory=dict)  # fits by those that they were settled from
-    prints: list[Fingerprint] = field(default_factory=list)
 
     @property
     def base(self) -> Fit:
@@ -94,25 +147,21 @@ class Story:
         """The error of each step."""
         return [step.rung for step in self.steps]
 
+    @property
+    def named(self) -> list[str]:
+        """The library's effects in the model that are no parameters outside their tolerance."""
+        return [one.name for one in self.added if one.name in CATALOGUE and not one.stands_for]
+
     def left(self) -> Left:
         """What the last model leaves."""
         return left_by(self.data, self.current)
 
-    def ranked(self, names: Sequence[str] | None = None) -> list[Candidate]:
-        """All effects (or these) with the fall of χ² that is predicted for each, the most promising first.
-
-        What the model has no place for comes last, with the reason.
-        """
-        left_out = self.looked_for(names or None)
-        return scored(self.current, self.prints) + left_out
-
-    def looked_for(self, names: Sequence[str] | None = None, orders: Sequence[float] | None = None) -> list[Candidate]:
-        """Makes the fingerprints, `prints`, of all effects (or these), at all orders that can be seen (or these).
-
-        Returned is what the model has no place for.
-        """
-        known = self.current.actuator.effects
+    def fingerprints(
+        self, names: Sequence[str] | None = None, orders: Sequence[float] | None = None
+    ) -> tuple[list[Fingerprint], list[Candidate]]:
+        """Of all effects (or these), at all orders that can be seen (or these); and what the model has no place for."""
         actuator = self.current.actuator
+        known = actuator.effects
         acting = [name for name in CATALOGUE if may_act(name, actuator)]
         wanted = [name for name in (acting if names is None else names) if name not in known]
         barred = {name: reason for name in wanted if (reason := cannot_represent(actuator, name))}
@@ -121,78 +170,27 @@ class Story:
         orders = self.left().orders if orders is None else orders
         if actuator.axes.motor == "linear":
             orders = orders[:_MOST_PITCHES]  # the rest are there to tell what noise is
-        self.prints = fingerprints(self.data, self.current, wanted, orders)
-        self.prints += of_the_file(self.current, [name for name in given if names is None or name in names])
-        return [Candidate(name, 0.0, {}, cannot_represent=reason) for name, reason in barred.items()]
-
-    def signatures(self, ranked: Sequence[Candidate]) -> dict[str, Array]:
-        """What each candidate, of the last `ranked`, would take from what is measured less the model.
-
-        (values,), over the floor, at the strength that suits best; only what the calibration cannot do as well.
-        """
-        prints = {
-            one.name: [p for p in self.prints if p.name == one.name and p.settings.get("order") == order]
-            for one in ranked
-            for order in (one.settings.get("order"),)
-        }
-        return signatures(self.current, {name: its for name, its in prints.items() if its})
-
-    def tried(
-        self, ranked: Sequence[Candidate], share: float, most: int, tell: Progress, known: Sequence[Trial] = ()
-    ) -> list[Trial]:
-        """The most promising candidates, each in the model and refitted, the best first; known: refitted before."""
-        chosen = self.promising(ranked, share, most)
-        trials = [one for one in known if any(one.candidate is candidate for candidate in chosen)]
-        new = [one for one in chosen if all(one is not trial.candidate for trial in trials)]
-        trials += fits(self.trial, new, tell)
-        if is_near(self.current):
-            leading = max([LEAST_BIC, *(_LEADS * trial.drop for trial in trials)])
-            leaders = [trial for trial in trials if trial.drop > leading]
-            trials = [trial for trial in trials if trial.drop <= leading]
-            trials += fits(lambda trial, tell: again(self.data, self.current, trial, tell), leaders, tell)
-        return sorted(trials, key=lambda trial: -trial.drop)
-
-    def promising(self, ranked: Sequence[Candidate], share: float, most: int) -> list[Candidate]:
-        """The candidates that are worth a refit."""
-        expected = {
-            name: predicted_evidence(self.data, self.current, part) for name, part in self.signatures(ranked).items()
-        }
-        return promising(self.current, ranked, share, most, expected)
-
-    def tried_whole(self, ranked: Sequence[Candidate], tell: Progress) -> list[Trial]:
-        """The candidates that act by a speed, refitted from where all of their change comes nearest.
-
-        What sticks and slides is not straight in any parameter; a score, which takes it to be, may then see nothing.
-        """
-        nearest = []
-        for candidate in ranked:
-            prints = [one for one in self.prints if one.name == candidate.name and find(one.name).at_speeds]
-            if prints and not candidate.obstacle:
-                best = min(prints, key=lambda one: float(np.sum((self.current.residual + one.columns[:, 0]) ** 2)))
-                nearest.append(replace(candidate, settings=best.settings))
-        return fits(self.trial, nearest, tell)
+        prints = fingerprints(self.data, self.current, wanted, orders)
+        prints += of_the_file(self.current, [name for name in given if names is None or name in names])
+        return prints, [Candidate(name, 0.0, {}, cannot_represent=reason) for name, reason in barred.items()]
 
     def trial(self, candidate: Candidate, tell: Progress = lambda text: None) -> Trial:
         """One candidate in the model, refitted."""
-        if candidate.name in FAULTS:
-            return fault_trial(self.data, self.current, candidate, tell)
-        tell(f"trying {candidate.name}")
-        return tried(self.data, self.current, candidate, {candidate.name: candidate.settings}, tell)
-
-    def faults(self, ranked: Sequence[Candidate], tell: Progress = lambda text: None) -> list[Trial]:
-        """The actuator's faults that are worth a refit beside these effects, each in the model and refitted."""
-        return tried_faults(self.data, self.current, ranked, tell)
-
-    def fault(self, faults: Sequence[Trial], effects: Callable[[], Sequence[Trial]]) -> Trial | None:
-        """Of the faults() refitted the one that tells more than any of the effects() refitted."""
-        found = fault_for(self.data, self.held, self.current, faults, effects)
-        if found and found.same_as:
-            self.ties[found.candidate.name] = found.same_as
-        return None if found and found.yields else found
+        name = candidate.name
+        is_the_files = name in self.of_the_file and all(one.key != name for one in self.added)
+        return refitted(self.data, self.current, candidate, self.current.starts, tell, key=name if is_the_files else "")
 
     def curve(self, explanation: Explanation | None, tell: Progress = lambda text: None) -> Trial | None:
-        """The residual's own curve as a torque, refitted, if the data pay for it."""
-        return curve_for(self.data, self.held, self.current, explanation, tell)
+        """The residual's own curve as a torque, refitted, if the model with it is far more probable."""
+        trial = curve_trial(self.data, self.current, explanation, tell)
+        return trial if trial is not None and self.gain(trial.fit) > NAMED else None
+
+    def gain(self, found: Fit, beside: Fit | None = None) -> float:
+        """By how much more probable a fit makes the recordings than another, the last model: as a logarithm."""
+        beside = beside or self.current
+        noise = noise_of(self.data, beside)
+        after, before = (evidence_of_fit(self.data, self.held, one, noise).log for one in (found, beside))
+        return after - before
 
     def add(self, trial: Trial, ties: Sequence[str] = ()) -> None:
         """Takes a trial for the next model."""

@@ -10,12 +10,13 @@ from ema_model.actuator.file import check_represents
 from ema_model.comparison.compare import weights_of
 from ema_model.comparison.loop_lag import other_controller
 from ema_model.comparison.residuals import OPEN_LOOP
-from ema_model.discovery.candidates.refit import settings_in, tried
 from ema_model.discovery.criteria import FAR
+from ema_model.discovery.history import Step, Story, rung_of
 from ema_model.discovery.observed.repeatability import by_inverse_dynamics, is_lost, with_divergence
+from ema_model.discovery.refit import settings_in, together
 from ema_model.discovery.result import Change
-from ema_model.discovery.steps.path import Story
-from ema_model.discovery.steps.step import Step, rung_of
+from ema_model.discovery.scoring import scored_terms
+from ema_model.discovery.terms import noise_of, terms_of
 from ema_model.discovery.words import NOT_REPEATABLE, OPEN_LOOP_LEFT
 from ema_model.errors import InputError
 from ema_model.estimation.model_fit import Data, fit, floor_ratio, gather, in_floors_of, with_effect
@@ -123,11 +124,14 @@ def with_fitted_effects(
     compile_library(actuator)
     story = calibrated_story(measurements, actuator, (), None, tell)
     tell("looking for the effects' values")
-    found = {one.name: one for one in story.ranked(names) if not one.obstacle and one.predicted_drop > 0.0}
+    prints, _ = story.fingerprints(names)
+    noise, orders = noise_of(story.data, story.current), story.left().orders
+    scored = scored_terms(story.current, terms_of(story.data, story.current, prints, noise, orders), noise)
+    found = {one.candidate.name: one.candidate for one in scored if one.candidate.predicted_drop > 0.0}
     guessed = {name: found[name].settings for name in names if name in found}
     if guessed:
-        trial = tried(story.data, story.current, next(iter(found.values())), guessed, tell)
-        guessed = settings_in(trial.fit, guessed)
+        fitted = together(story.data, story.current, guessed, story.current.starts, tell)
+        guessed = settings_in(fitted, guessed)
     for name in names:
         actuator = with_effect(actuator, name, guessed.get(name, actuator.effects.get(name, {})))
     return actuator

@@ -1,25 +1,82 @@
-"""How sure a model's parameters are where what is left is no noise: told, and fitted, by its own size and colour."""
+"""How sure a model's parameters are where what is left is no noise: told, and fitted, by its own size and colour.
+
+χ² counts in units of the sensors' noise, as if values were independent.  Where physics is missing that the model
+cannot have, what is left is neither: it is large, and it comes in few shapes that last.  It then tells as much less of
+a parameter as its power at its own frequencies stands above white noise; at the floor it tells as much as noise does.
+
+The spectrum is the residual's own, over whole windows and over pieces of them, since errors may last and may come in
+bursts: the higher of the two counts.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ema_model.discovery.evidence.counted import colour_of, signals_of
 from ema_model.estimation import Calibration
 from ema_model.estimation.calibrate import calibrated, problem_of
 from ema_model.estimation.information import by_pieces, posterior
 from ema_model.estimation.model_fit import Data, Fit, fit
+from ema_model.models import Model
 from ema_model.quantities.numbers import HALF_90
 
 Array = NDArray[np.float64]
 
+_PIECE = 256  # values, an eighth of a second
 _OF_FILE = 2.0 / HALF_90  # times that a tolerance counts which nothing checks
 _ROUNDS = 6  # of fits at most, each without the parameters that the one before drove to their bounds
+_OUTSIDE = 3.0  # σ of a parameter's tolerance, beyond which it lies outside
+_TOGETHER = 0.7  # correlation from which on two are drawn by the same
+
+
+def colour(data: Data, plant: Model, residual: Array) -> Array:
+    """How many times above white noise of the floor's size a residual is where its power lies: (values,), at least 1.
+
+    χ² over it is the number of independent values that a signal of such a spectrum has.
+    """
+    parts: dict[str, list[slice]] = {}
+    for name, rows in signals_of(data, plant):
+        parts.setdefault(name, []).append(rows)
+    found = np.ones(len(residual))
+    for its in parts.values():
+        whole = [residual[rows] for rows in its]
+        if np.mean(np.concatenate(whole) ** 2) <= 1.0:
+            continue  # within what sensors and the model's own limits leave: the floor tells how that is correlated
+        pieces = [piece for one in whole for piece in np.array_split(one, max(1, round(len(one) / _PIECE)))]
+        density = max(1.0, _density(whole), _density(pieces))
+        for rows in its:
+            found[rows] = density
+    return found
+
+
+def signals_of(data: Data, plant: Model) -> Iterator[tuple[str, slice]]:
+    """The fitted signals of each window with their rows in a residual, in its order."""
+    row = 0
+    for window in plant.windows:
+        for name in data.signals:
+            if name in window.measured:
+                yield name, slice(row, row + window.blocks)
+                row += window.blocks
+
+
+@lru_cache(maxsize=32)
+def colour_of(data: Data, found: Fit) -> Array:
+    """`colour` of what a fit leaves."""
+    return colour(data, found.plant, found.residual)
+
+
+def _density(parts: list[Array]) -> float:
+    """Mean of a spectrum, weighted by itself; 1 for white noise of variance 1, whose periodogram scatters so."""
+    fourth = second = 0.0
+    for values in parts:
+        power = np.abs(np.fft.rfft(values)) ** 2 / len(values)
+        fourth += float(power @ power)
+        second += float(power.sum())
+    return 0.5 * fourth / second if second > 0.0 else 0.0
 
 
 @lru_cache(maxsize=16)  # a page asks at every look
@@ -94,3 +151,25 @@ def settled(data: Data, found: Fit, tell: Callable[[str], None]) -> Fit:
 def is_base(path: str) -> bool:
     """Whether a parameter is the actuator's own, and no fault's or effect's."""
     return "." in path and not path.startswith("effects.")
+
+
+def outside_tolerance(data: Data, found: Fit) -> list[str]:
+    """Paths of the actuator's parameters whose value no tolerance of its file allows.
+
+    Without a controller one scale holds all torques, so that several parameters share what draws at them, and none of
+    them may be far off.  If the file is right, the estimates, in σ of the tolerances, are spread by 1 − C where C is
+    the posterior's covariance: what counts is how far one is off in that, and of those drawn together, the farthest.
+    """
+    calibration = found.calibration
+    if found.plant.simulates_commands:
+        return [name for name in calibration.outside_tolerance if is_base(name)]
+    jacobian = calibration.weighted_jacobian / np.sqrt(colour_of(data, found))[:, None]
+    expected = np.eye(calibration.x.size) - posterior(jacobian)
+    spread = np.sqrt(np.maximum(np.diag(expected), np.finfo(float).eps))
+    together = np.abs(expected / np.outer(spread, spread)) > _TOGETHER
+    told: list[int] = []
+    for i in np.argsort(-np.abs(calibration.x[: len(calibration.free)])):
+        is_far = abs(calibration.x[i]) > _OUTSIDE * spread[i]
+        if is_far and is_base(calibration.free[i]) and not together[i, told].any():
+            told.append(int(i))
+    return [calibration.free[i] for i in sorted(told)]

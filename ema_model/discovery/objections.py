@@ -1,8 +1,10 @@
-"""Whether an effect is the same everywhere: its parameters, found on parts of the recordings apart, must agree.
+"""What speaks against an effect that the evidence is for, in plain words: a value that no such part has, or another one
+in each recording.
 
-Parts are recordings, or the halves of a single one.  On each the fit takes one step from where all together ended, with
-the same prior; how far it goes is told by what is left there, not by the sensors' noise.  What stands in for something
-else is bent another way by another motion.
+Where physics is missing that the library does not have, some effect bends into its place.  Whether an effect is the
+same everywhere is asked of parts of the recordings, or of the halves of a single one: on each the fit takes one step
+from where all together ended, with the same prior; how far it goes is told by what is left there, not by the sensors'
+noise.  What stands in for something else is bent another way by another motion.
 """
 
 from __future__ import annotations
@@ -13,16 +15,86 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ema_model.discovery.criteria import APART, DISAGREES, LATE_BY, PHASES_APART
-from ema_model.discovery.evidence.counted import colour, signals_of
+from ema_model.actuator.parameters import on_axes
+from ema_model.discovery.criteria import ANOTHER, APART, DISAGREES, LATE_BY, PHASES_APART
+from ema_model.discovery.fingerprints import greatest, travel
+from ema_model.discovery.uncertainty import colour, signals_of
 from ema_model.effects import catalogue_name, find
 from ema_model.effects.effect import ANGLES
 from ema_model.estimation.model_fit import Data, Fit
+from ema_model.quantities.numbers import number
+from ema_model.quantities.titles import in_sentence
+from ema_model.recordings import SIGNALS
 
 Array = NDArray[np.float64]
 
+_READINGS = {
+    "current_reading": "current_A",
+    "position_reading": "user_position_rad",
+    "motor_angle_reading": "motor_position_rad",
+    "motor_speed_reading": "motor_speed_rad_s",
+}
 _LOOSE = 0.1  # of the prior's weight, that an effect's own parameters keep: their σ is only a guess
 _TELLS = 0.5  # of an amplitude, up to which its σ in a part says anything of it
+
+
+def unmeasured(data: Data, key: str) -> str:
+    """A sensor's error, where nothing was recorded of that sensor."""
+    effect = find(catalogue_name(key))
+    signals = [_READINGS[place.__name__] for place in effect.places if place.__name__ in _READINGS]
+    if signals and not any(signal in one for one in data.measurements for signal in signals):
+        return "the signal that it falsifies was not recorded"
+    return ""
+
+
+def within(before: Fit, after: Fit, key: str) -> str:
+    """An effect of the file that stays where the file has it."""
+    file = before.actuator
+    if key not in file.effects:
+        return ""
+    values = after.calibration.actuator.effects[key].items()
+    moved = [
+        abs(value - file.effects[key][name]) / file.tolerances[path].sigma
+        for name, value in values
+        if (path := f"effects.{key}.{name}") in file.tolerances and file.tolerances[path].sigma > 0.0
+    ]
+    return "" if max(moved, default=0.0) > ANOTHER else "with it the actuator is within the file's tolerances"
+
+
+def implausible(after: Fit, key: str) -> str:
+    """A value that no such part has."""
+    values = after.calibration.actuator.effects[key]
+    for parameter in find(catalogue_name(key)).parameters:
+        value, low, high = values[parameter.name], *parameter.plausible
+        size, beside = 1.0, ""
+        if parameter.plausible_at:
+            size = greatest(after, parameter.plausible_at)
+            beside = f" at {number(size)} {SIGNALS[parameter.plausible_at].unit}"
+        elif parameter.plausible_of:
+            whole = abs(after.calibration.actuator.value(parameter.plausible_of))
+            size = 1.0 / max(whole, 1e-300)
+            beside = f" beside a {_title(after, parameter.plausible_of)} of {number(whole)}"
+        if (low is not None and value * size < low) or (high is not None and value * size > high):
+            return f"its {_title(after, f'effects.{key}.{parameter.name}')} of {number(value)} is not plausible{beside}"
+        if parameter.name == "period_rad" and value > travel(after):
+            return "its period is longer than the travel"
+    return ""
+
+
+def unsteady(data: Data, after: Fit, key: str) -> str:
+    """Another value of one of its parameters in each part of the recordings."""
+    apart = disagreement(data, after, key)
+    if apart is None:
+        return ""
+    values = " and ".join(number(value) for value in (min(apart.values), max(apart.values)))
+    parts = "the recordings" if len(data.measurements) > 1 else "the halves of the recording"
+    return f"{parts} ask for another {_title(after, apart.parameter)} each: {values}"
+
+
+def _title(found: Fit, path: str) -> str:
+    """'stiffness' of 'effects.hinge_moment.stiffness_Nm_rad'."""
+    title = on_axes(path, found.actuator.axes).title
+    return in_sentence(title.rpartition(": ")[2])
 
 
 @dataclass(frozen=True, eq=False)

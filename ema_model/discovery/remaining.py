@@ -19,7 +19,6 @@ from ema_model.comparison.explain import (
     orders_in,
     pitches,
     used_blocks,
-    without_spikes,
 )
 from ema_model.comparison.explain import orders as orders_of
 from ema_model.comparison.regions import Event, events
@@ -66,9 +65,14 @@ class Left:
         return next((one for one in self.explained if one.significant), None)
 
 
+def ratio(data: Data, found: Fit) -> float:
+    """The error of a fit in the floors that it was weighed by."""
+    return floor_ratio(data.before_fit, found.plant, found.calibration.signals)
+
+
 def at_floor(data: Data, found: Fit) -> bool:
-    """Whether a fit leaves so little that the walk takes it for the floor, before a fit takes from that."""
-    return floor_ratio(data.before_fit, found.plant, found.calibration.signals) <= BAND
+    """Whether a fit leaves so little that the search takes it for the floor, before a fit takes from that."""
+    return ratio(data, found) <= BAND
 
 
 def within_band(data: Data, found: Fit) -> bool:
@@ -81,12 +85,6 @@ def silence(data: Data, found: Fit) -> str:
     return silent(found.plant.windows, data.told_in)[1]
 
 
-def may_be_true(data: Data, found: Fit) -> bool:
-    """Whether a fit leaves so little that an effect must tell most of it to be more than a bent one."""
-    most = max(BAND, most_of_floor(data.floor_spread))
-    return floor_ratio(data, found.plant, found.calibration.signals) <= most
-
-
 @lru_cache(maxsize=16)
 def lasts(data: Data, found: Fit) -> bool:
     """Whether what is left of a signal lasts longer than noise does, as `compare` has it."""
@@ -96,23 +94,10 @@ def lasts(data: Data, found: Fit) -> bool:
     return bool(lasting(residuals, [name for name in data.signals if name in residuals.values]))
 
 
-@lru_cache(maxsize=4)  # a walk asks before and after it has looked for the next effect
+@lru_cache(maxsize=4)  # a search asks before and after it has looked for the next effect
 def left_by(data: Data, found: Fit) -> Left:
     """What a fit leaves."""
     return Left(data, found)
-
-
-def used_left(data: Data, before: Fit, after: Fit) -> tuple[str, Array, Array]:
-    """The signal that is explained, and what two fits leave of it where it counts, over its floor: (blocks,) each."""
-    first, second = residuals_left(data, before), residuals_left(data, after)
-    primary = _primary(first)
-    used = used_blocks(first, primary)
-    if used is None:
-        return primary, np.zeros(0), np.zeros(0)
-    left = second.values[primary] - second.known.get(primary, 0.0)
-    own = used.values * used.weight
-    most = float(np.max(np.abs(without_spikes(own))))
-    return primary, np.clip(own, -most, most), np.clip(left[used.chosen] * used.weight, -most, most)
 
 
 @lru_cache(maxsize=4)  # of a fit and of the one before it

@@ -6,6 +6,7 @@ fit finds them together with the parameters that had taken up a part of what was
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -15,11 +16,13 @@ from ema_model.actuator import Actuator, Tolerance
 from ema_model.comparison.explain import HIGHEST_ORDER, Explanation, modulator_of, used_blocks
 from ema_model.comparison.residuals import Residuals
 from ema_model.comparison.verdict import ORDER_OF_PRIMARY
-from ema_model.discovery.evidence.remaining import residuals_left
+from ema_model.discovery.refit import Trial
+from ema_model.discovery.remaining import residuals_left
+from ema_model.discovery.result import Candidate
 from ema_model.effects.user import UserEffect, torque_curve
 from ema_model.effects.user.curve import MOST_KNOTS, OF_VARIABLE
 from ema_model.errors import InputError
-from ema_model.estimation.model_fit import Data, Fit
+from ema_model.estimation.model_fit import Data, Fit, fit
 
 Array = NDArray[np.float64]
 
@@ -28,6 +31,7 @@ _LEAST_KNOTS = 4
 _SMOOTH = 1e-3  # of the mean knot's weight, on second differences: it bridges knots that no data reach
 _FINER = 0.02  # of χ², that another modulator or a shorter period must be better by
 _TURN = 2.0 * np.pi
+_TEETH = 4  # periods in a turn from which on a torque is one of teeth or poles
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,6 +44,22 @@ class _Curve:
     periodic: bool
     knots: Array  # in the residual signal's unit
     chi2: float
+
+
+def curve_trial(data: Data, current: Fit, explanation: Explanation | None, tell: Callable[[str], None]) -> Trial | None:
+    """The model with the residual's own curve as a torque, refitted; None where what explains it is no torque."""
+    if explanation is None or not is_torque(explanation, current.actuator):
+        return None
+    tell(f"trying a curve over the {explanation.variable.replace('_', ' ')}")
+    actuator, name = with_curve(data, current, explanation)
+    found = fit(data, actuator, current.starts, tell, current.faults)
+    settings = dict(actuator.effects[name])
+    return Trial(Candidate(name, 0.0, settings), {name: settings}, found, current.chi2 - found.chi2)
+
+
+def is_a_shape(orders: Sequence[float]) -> bool:
+    """Whether several low orders together are no teeth, but one shape within the turn, which no order is."""
+    return len(orders) > 1 and max(orders) < _TEETH
 
 
 def with_curve(data: Data, found: Fit, explanation: Explanation) -> tuple[Actuator, str]:

@@ -1,0 +1,599 @@
+"""The search for what is missing: all Terms scored by algebra, the best few refitted, the most probable model kept.
+
+Each round makes the columns of all Terms at the model as it is, looks by algebra at what adding, exchanging and leaving
+out would give, refits the few that might be best, and goes on from the one with the greatest evidence, as long as there
+is any that is far more probable than what is there.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ema_model.comparison.explain import Explanation
+from ema_model.discovery.contradictions import contradictions, goes_by_angle, put_right
+from ema_model.discovery.criteria import (
+    ANY_MISSING,
+    AS_WELL,
+    FAR,
+    HALF,
+    LARGEST_GROUP,
+    LEAST_FALL,
+    LOOP_TOLD,
+    MIGHT,
+    NAMED,
+    TOLD_WELL,
+    WORTH_A_REFIT,
+)
+from ema_model.discovery.curve import is_a_shape
+from ema_model.discovery.evidence import evidence_of, gains_of
+from ema_model.discovery.fingerprints import Fingerprint, fingerprints
+from ema_model.discovery.history import Story
+from ema_model.discovery.inverse import Opinion, compared, second_opinion, taken_over
+from ema_model.discovery.objections import implausible, unmeasured, unsteady, within
+from ema_model.discovery.observed.transmission import transmission_seen
+from ema_model.discovery.observed.two_masses import two_masses_seen
+from ema_model.discovery.refit import Trial, refitted
+from ema_model.discovery.remaining import at_floor, ratio
+from ema_model.discovery.result import Candidate
+from ema_model.discovery.scoring import AboutFit, Evident, ScoredTerm, evidence_of_fit, places_of, scored_terms
+from ema_model.discovery.terms import Term, hidden, noise_of, terms_of
+from ema_model.effects import CATALOGUE, catalogue_name, find
+from ema_model.estimation.model_fit import Data, Fit, floor_ratio
+from ema_model.estimation.noise import NoiseModel
+from ema_model.faults import NAMES, causes
+from ema_model.side_by_side import fits
+
+Progress = Callable[[str], None]
+
+_REFITTED = 4  # Terms of a round
+_MADE_ANEW = 32  # Terms beside a further model, by what those of the first one tell beside it
+_APART = 0.5  # orders, closer than which two are one
+NO_LIMIT = 100  # of effects
+
+
+@dataclass(frozen=True)
+class Found:
+    """What a search saw besides the story's own steps."""
+
+    candidates: Sequence[Candidate]  # of its first round, the best first
+    rivals: Sequence[Trial]  # that could not be told apart, the chosen one first
+    unknown: Explanation | None  # what the last model leaves, or what the curve stands for
+
+
+def search(
+    story: Story,
+    tell: Progress = lambda text: None,
+    *,
+    candidates: Sequence[str] | None = None,
+    most_effects: int = NO_LIMIT,
+    known: Search | None = None,
+) -> Found:
+    """Goes on by itself from where a story stands: adds what is missing, takes out what is not, draws what is unknown.
+
+    Where a closed loop is left unexplained, inverse dynamics is asked as well, and takes over if the controller is to
+    blame, or if the loop names nothing, or little of what is left.  tell is told after each step, too, and may raise
+    to stop; the story then stands at its last whole step.  known: a search that has looked at this story before.
+    """
+    own = known or Search(story, candidates, most_effects)
+    before, own.tell = own.tell, tell
+    try:
+        return _searched(story, own, _Beside(story, tell, candidates, most_effects))
+    finally:
+        own.tell = before
+
+
+def _searched(story: Story, own: Search, beside: _Beside) -> Found:
+    left = max(FAR, LOOP_TOLD * ratio(story.data, story.base))
+    # A loop whose drive is another one is searched in vain; one that lacks a limit, which is not straight, tells so
+    # only once that is refitted.
+    if own.is_untold():
+        in_vain = own.drive_leaves() > left if own.suspects_drive() else beside.blames_controller()
+    else:
+        in_vain = own.suspects_drive() and beside.blames_controller() and own.drive_leaves() > left
+    if in_vain and beside.settles():
+        found = beside.taken_over()
+    else:
+        own.step()
+        if ratio(story.data, story.current) > left and beside.blames_controller() and beside.settles():
+            found = beside.taken_over()
+        else:
+            found = own.ended()
+            opinion = beside.asked()
+            if opinion is not None:
+                wanted = opinion.blames_controller or not story.named or ratio(story.data, story.current) > FAR
+                if wanted and beside.explains_better():
+                    found = beside.taken_over()
+                else:
+                    compared(story, opinion, own.tell)
+    if not story.current.plant.simulates_commands:
+        seen = story.data.measurements, story.current.calibration.actuator
+        story.transmission_seen = transmission_seen(*seen)
+        story.two_masses_seen = None if at_floor(story.data, story.current) else two_masses_seen(*seen)
+    story.disagreements = [*story.turned, *contradictions(story, own.tell)]
+    return found
+
+
+# --- one round: all Terms beside one model, and the few that are refitted ---------------------------------------------
+
+
+@dataclass(frozen=True, eq=False)
+class Contender:
+    """A refitted trial, and how much more probable it makes the recordings than the model that it was tried beside."""
+
+    trial: Trial
+    gain: float  # logarithm, with what is known of it beforehand
+    fitted: float  # the same by what was fitted alone
+    density: float  # the logarithm of the probability density at its most probable parameters alone
+
+    def is_told_apart_from(self, other: Contender) -> bool:
+        """Whether the recordings tell this one from another that is less probable.
+
+        Not from one that fits as well, and is less probable for its freedom alone.
+        """
+        return other.gain < self.gain - NAMED and other.density < self.density - AS_WELL
+
+
+@dataclass(frozen=True, eq=False)
+class Round:
+    """What was seen of all Terms beside one model."""
+
+    beside: Fit
+    noise: NoiseModel
+    before: Evident  # of that model
+    hidden: Sequence[Candidate]  # what the model has no place for, or these recordings cannot show
+    best: Sequence[ScoredTerm]  # by algebra, the most probable first
+
+    @property
+    def prior(self) -> float:
+        """Logarithm of the odds that any one of the Terms is missing."""
+        return math.log(ANY_MISSING / max(1, len(self.best)))
+
+    def contender(self, data: Data, held: Data | None, one: ScoredTerm, trial: Trial) -> Contender:
+        """A Term that was refitted."""
+        after, share = evidence_of_fit(data, held, trial.fit, self.noise), one.term.log_share
+        fitted = after.fitted - self.before.fitted + share
+        return Contender(trial, after.log - self.before.log + share, fitted, after.density + after.unseen)
+
+    def probabilities(self, contenders: Sequence[Contender] = ()) -> dict[str, float]:
+        """How probable each candidate is, of all and none: of what was refitted by that, of the others by algebra."""
+        gains = {one.candidate.name: one.gain for one in self.best}
+        gains |= {one.trial.candidate.name: one.gain for one in contenders}
+        odds = {name: gain + self.prior for name, gain in gains.items()}
+        whole = float(np.logaddexp.reduce([0.0, *odds.values()]))
+        return {name: math.exp(one - whole) for name, one in odds.items()}
+
+    def candidates(self, contenders: Sequence[Contender] = ()) -> list[Candidate]:
+        """All candidates, the most probable first, with what their refits gave; what cannot be shown says so."""
+        drops = {one.trial.candidate.name: one.trial.drop for one in contenders}
+        probable = self.probabilities(contenders)
+        found = {one.candidate.name: one.candidate for one in self.best}
+        found |= {one.name: one for one in self.hidden if one.name not in drops}
+        every = [
+            replace(one, refitted_drop=drops.get(name), probability=probable.get(name, 0.0))
+            for name, one in found.items()
+        ]
+        return sorted(every, key=lambda one: -(one.probability or 0.0))
+
+
+class Search:
+    """A story that goes on by one evidence; each of its models is looked at once."""
+
+    def __init__(
+        self,
+        story: Story,
+        candidates: Sequence[str] | None = None,
+        most_effects: int = NO_LIMIT,
+        tell: Progress = lambda text: None,
+    ) -> None:
+        self.story, self.tell = story, tell
+        self._names, self._most = candidates, most_effects
+        self._first: list[Candidate] = []
+        self._rivals: list[Trial] = []
+        self._curve: Trial | None = None
+        self._going = True
+        self._known: Round | None = None
+        self._refitted: tuple[Round, list[Contender]] | None = None
+        self._exchanges: set[tuple[str, str]] = set()  # that were tried
+        self._made: list[Term] = []  # all Terms of effects, beside an earlier model
+        self._hidden: Sequence[Candidate] = ()
+
+    # --- whether a closed loop is worth a search ----------------------------------------------------------------------
+
+    def is_untold(self) -> bool:
+        """Whether the loop is far off, and nothing would tell most of it."""
+        most = TOLD_WELL * self.story.current.chi2
+        return self._is_far() and all(one.candidate.predicted_drop < most for one in self.round().best)
+
+    def suspects_drive(self) -> bool:
+        """Whether the loop is far off, and what is most probable is of the drive."""
+        best = self.round().best if self._is_far() else []
+        return bool(best) and _of_drive(best[0].candidate)
+
+    def drive_leaves(self) -> float:
+        """What the best contenders of the drive leave, in floors."""
+        trials = [one.trial for one in self._contenders() if _of_drive(one.trial.candidate)]
+        return min((ratio(self.story.data, trial.fit) for trial in trials), default=math.inf)
+
+    def _is_far(self) -> bool:
+        story = self.story
+        return ratio(story.data, story.current) > FAR and story.current.plant.simulates_commands
+
+    # --- to the end ---------------------------------------------------------------------------------------------------
+
+    def ended(self) -> Found:
+        """Goes on to the end, draws what is unknown, and settles."""
+        story, tell = self.story, self.tell
+        self._go_to_the_end()
+        self._curve_instead()
+        story.finish(tell)
+        unknown = story.left().explanation
+        if unknown is not None and not story.named:
+            unknown = _with_curve(story, self._curve, unknown, tell)
+        story.settle(tell)  # last: beside a settled model any refit falls that only goes back to the sensors' noise
+        return Found(self._first, _still_alike(story, self._rivals), unknown)
+
+    def _go_to_the_end(self) -> None:
+        """Adds, exchanges and takes out what makes the model more probable."""
+        while self._going:
+            self.step()
+        while self._exchanged() or self._doubtful():
+            pass
+
+    def step(self) -> None:
+        """The most probable Term into the model; beside as many effects as are asked for, a fault alone.
+
+        Where none is far more probable than the model as it is, the search has come to its end.
+        """
+        self._going = self._added()
+
+    # --- what is seen beside the last model ---------------------------------------------------------------------------
+
+    def round(self) -> Round:
+        """All Terms beside the last model."""
+        story, found = self.story, self.story.current
+        if self._known is None or self._known.beside is not found:
+            noise = noise_of(story.data, found)
+            self.tell("scoring the candidates")
+            best = scored_terms(found, self._terms(noise), noise)
+            before = evidence_of_fit(story.data, story.held, found, noise)
+            self._known = Round(found, noise, before, self._hidden, best)
+        return self._known
+
+    def _terms(self, noise: NoiseModel) -> list[Term]:
+        """The Terms beside the last model: the first time all of them, then anew those that might tell most.
+
+        What a Term changes depends little on what else is in the model: enough to know which are hopeless.
+        """
+        story, found = self.story, self.story.current
+        known, shown = self._made, story.left().orders
+        are_of_this = known and len(known[0].columns) == len(found.residual)
+        if not are_of_this or found.actuator.axes.motor == "linear":  # whose orders are the residual's
+            prints, barred = story.fingerprints(self._names or None)
+            unseen = [Candidate(name, 0.0, {}, reason) for name, reason in hidden(found, prints).items()]
+            self._hidden = [*unseen, *barred]
+            terms = terms_of(story.data, found, [*prints, *_further_orders(story, shown)], noise, shown)
+            self._made = [one for one in terms if one.fingerprint and not one.fingerprint.frees]
+            return terms
+        about = AboutFit.of(found, noise)
+        own = evidence_of(noise, about.residual, about.unknowns)
+        gains = gains_of(noise, own, about.unknowns, [one.unknowns for one in known])
+        telling = [known[i] for i in np.argsort(-gains)[:_MADE_ANEW]]
+        names = {one.name for one in telling}
+        orders = sorted({one.fingerprint.settings["order"] for one in telling if "order" in one.fingerprint.settings})
+        present = found.actuator.effects
+        ours = [name for name in story.of_the_file if name in present]  # beyond their tolerances
+        prints, _ = story.fingerprints([*(name for name in CATALOGUE if name in names), *ours], orders)
+        terms = terms_of(story.data, found, [*prints, *_further_orders(story, orders)], noise, shown)
+        return terms + [one for one in known if one.name not in names and one.name not in present]
+
+    def _contenders(self) -> list[Contender]:
+        """The few Terms that might be the best beside the last model, refitted, the most probable first."""
+        story, seen = self.story, self.round()
+        if self._refitted is None or self._refitted[0] is not seen:
+            is_full = len({one.name for one in story.added}) >= self._most
+            room = [one for one in seen.best if one.term.fingerprint is None or not is_full]
+            found: list[Contender] = []
+            best = -math.inf
+            while len(found) < _REFITTED:
+                left = [one for one in room[len(found) :] if one.gain > max(WORTH_A_REFIT, best)]
+                chosen = [one for one in left if one.gain > MIGHT * left[0].gain][: _REFITTED - len(found)]
+                if not chosen:
+                    break
+                trials = fits(self._refit, chosen, self.tell)
+                found += [seen.contender(story.data, story.held, one, trial) for one, trial in zip(chosen, trials)]
+                best = max(one.gain for one in found)  # what promises more than this is refitted, too
+            self._refitted = seen, sorted(found, key=lambda one: -one.gain)
+        return self._refitted[1]
+
+    def _refit(self, one: ScoredTerm, tell: Progress) -> Trial:
+        """A Term in the last model, refitted from where the algebra has it."""
+        return refitted(self.story.data, self.story.current, one.candidate, one.start, tell, key=one.term.name)
+
+    # --- one step -----------------------------------------------------------------------------------------------------
+
+    def _added(self) -> bool:
+        story, seen, contenders = self.story, self.round(), self._contenders()
+        self._first = self._first or seen.candidates(contenders)
+        named = [one for one in contenders if one.gain + seen.prior > NAMED and not self._objection(one)]
+        if not named:
+            return self._turned_back(contenders) and self._added()
+        first = _simplest(named)
+        name = first.trial.candidate.name
+        alike = [one.trial for one in named if one is not first and not first.is_told_apart_from(one)]
+        as_probable = {one.candidate.name for one in [first.trial, *alike]}  # terms of a series among them
+        alike = [trial for trial in alike if trial.faults or name not in find(trial.candidate.name).terms]
+        faults = [trial for trial in alike if trial.faults]
+        effects = _without_series([trial for trial in alike if not trial.faults])
+        others = [*effects, *faults]
+        apart = [*(effects if first.trial.faults else _of_other_parts(first.trial, effects)), *faults]
+        if len(apart) >= LARGEST_GROUP:
+            story.refused[name] = f"{len(apart)} others tell as much"
+            return False
+        if others and not self._rivals:
+            self._rivals = [first.trial, *others]
+        story.add(first.trial, ties=[trial.candidate.name for trial in others])
+        story.finish(self.tell)
+        if not first.trial.faults:
+            probable = seen.probabilities(contenders)
+            story.set_probability(min(1.0, sum(probable[name] for name in as_probable)))
+        return True
+
+    def _objection(self, one: Contender) -> bool:
+        """Whether a value that no such part has, or another one in each recording, speaks against a contender.
+
+        Beside what else is missing, recordings may ask for another value each: it counts at the floor, and at the end.
+        """
+        story, found = self.story, one.trial.fit
+        reason = "" if found.calibration.converged else "the fit with it did not converge"
+        for key in one.trial.effects:
+            reason = reason or unmeasured(story.data, key) or within(story.current, found, key)
+            reason = reason or implausible(found, key) or self._idle(found)
+            if not reason and at_floor(story.data, found):
+                reason = unsteady(story.data, found, key)
+        if reason:
+            story.refused[one.trial.candidate.name] = reason
+        return bool(reason)
+
+    def _idle(self, found: Fit) -> str:
+        """Whether the error that is told does not fall: a verdict says no more than its ladder."""
+        data, current = self.story.data, self.story.current
+        first, last = (floor_ratio(data, one.plant, one.calibration.signals) for one in (current, found))
+        if first <= 1.0:
+            return "without it no more than the floor is left"
+        return "" if last < (1.0 - LEAST_FALL) * first else "the error does not fall with it"
+
+    def _turned_back(self, contenders: Sequence[Contender]) -> bool:
+        """Turns back the encoder of held-out recordings that deny what the fitted ones show; whether any was."""
+        story, prior = self.story, self.round().prior
+        by_angle = [one for one in contenders if any(goes_by_angle(key) for key in one.trial.effects)]
+        if story.held is None or not any(one.fitted + prior > NAMED for one in by_angle):
+            return False
+        alone = Story(story.data, None, [*story.steps])
+        Search(alone, self._names, self._most, self.tell)._go_to_the_end()
+        keys = [one.key for one in alone.added if goes_by_angle(one.key)]
+        if not keys or not put_right(story, alone.current, keys, self.tell):
+            return False
+        self._known = self._refitted = None
+        return True
+
+    # --- what is taken out again, or put in the place of another ------------------------------------------------------
+
+    def _doubtful(self) -> bool:
+        """Takes out an effect of which, in the last model, each recording asks for another value."""
+        story = self.story
+        for one in reversed(story.added):
+            reason = implausible(story.current, one.key) or unsteady(story.data, story.current, one.key)
+            if reason and one.name in CATALOGUE:
+                story.refused[one.name] = reason
+                story.remove(one.key)
+                return True
+        return False
+
+    def _curve_instead(self) -> None:
+        """Takes the residual's own curve in place of all effects, where it is more probable than they are together.
+
+        Or where several low orders are one shape within the turn, and no teeth.
+        """
+        story, seen = self.story, self.round()
+        effects = story.current.calibration.actuator.effects
+        orders = [effects[one.key]["order"] for one in story.added if "order" in effects[one.key]]
+        if not story.added or (at_floor(story.data, story.current) and not is_a_shape(orders)):
+            return
+        added = story.steps[story.bare :]
+        story.restart()
+        try:
+            curve = story.curve(story.left().explanation, self.tell)
+        finally:  # also when it was stopped
+            story.steps += added
+        if curve is None:
+            return
+        log = evidence_of_fit(story.data, story.held, curve.fit, seen.noise).log
+        if is_a_shape(orders) or log > seen.before.log + (len(story.added) - 1) * seen.prior:
+            story.restart()
+            self._curve = curve
+
+    def _exchanged(self) -> bool:
+        """Takes out what the last model does not need, or puts in its place what makes it more probable."""
+        story, tell = self.story, self.tell
+        members = [*(one.key for one in story.added), *causes(story.current.faults)]
+        if len(members) < 2:
+            return False
+        seen = self.round()
+        whole = AboutFit.of(seen.beside, seen.noise)
+        straight = evidence_of(seen.noise, whole.residual, whole.unknowns).log
+        for key in members:
+            smaller = whole.without(places_of(seen.beside, key))
+            if evidence_of(seen.noise, smaller.residual, smaller.unknowns).log < straight - 2.0 * NAMED:
+                continue
+            tell(f"trying without {key}")
+            found = story.without(key, tell)
+            if evidence_of_fit(story.data, story.held, found, seen.noise).log > seen.before.log - NAMED:
+                story.remove(key, found)
+                return True
+        return any(self._replaced(key, seen, whole, straight) for key in members[:-1])
+
+    def _replaced(self, key: str, seen: Round, whole: AboutFit, straight: float) -> bool:
+        """Puts the best other Term in the place of an effect or a fault where that makes the model more probable.
+
+        straight: the logarithm of the whole model's evidence, by algebra.
+        """
+        story, tell = self.story, self.tell
+        if not seen.best:
+            return False
+        about = whole.without(places_of(seen.beside, key))
+        own = evidence_of(seen.noise, about.residual, about.unknowns)
+        terms = [one.term for one in seen.best]
+        rough = gains_of(seen.noise, own, about.unknowns, [one.unknowns for one in terms])
+        term = terms[int(np.argmax(rough + [one.log_share for one in terms]))]
+        other = evidence_of(seen.noise, about.residual, about.unknowns.beside([term.unknowns]), own.levels)
+        if other.log + term.log_share < straight - NAMED or (key, term.name) in self._exchanges:
+            return False
+        self._exchanges |= {(key, term.name), (term.name, key)}
+        tell(f"weighing {term.name} against {key} again")
+        smaller = story.without(key, tell)
+        candidate = term.candidate(other.amounts[-len(term.unknowns.mean) :], story.current)
+        trial = refitted(story.data, smaller, candidate, smaller.starts, tell, key=term.name)
+        after = evidence_of_fit(story.data, story.held, trial.fit, seen.noise).log
+        gain = after + term.log_share - seen.before.log
+        if gain < 0.0:
+            if key not in NAMES:
+                story.tie(key, candidate.name, gain > -NAMED)
+            return False
+        if trial.faults or key in NAMES:
+            story.remove(key, smaller)
+            story.add(trial)
+        else:
+            story.swap(key, trial)
+        return True
+
+
+# --- inverse dynamics beside a closed loop ----------------------------------------------------------------------------
+
+
+class _Beside:
+    """Inverse dynamics beside a story: asked where it is wanted, and searched once."""
+
+    def __init__(self, story: Story, tell: Progress, candidates: Sequence[str] | None, most_effects: int) -> None:
+        self._story, self._tell, self._names, self._most = story, tell, candidates, most_effects
+        self._opinion: Opinion | None = None
+        self._found: Found | None = None
+
+    def asked(self) -> Opinion | None:
+        """Its opinion of the story as it stands now."""
+        self._opinion = second_opinion(self._story, self._tell, self._opinion)
+        return self._opinion
+
+    def blames_controller(self) -> bool:
+        """Whether the drive's current is not what the file's controller makes of the motion."""
+        opinion = self.asked()
+        return opinion is not None and opinion.blames_controller
+
+    def settles(self) -> bool:
+        """Whether, searched to its end, it explains enough of what flowed, and no torque tells the loop's error."""
+        opinion = self._ended()
+        may_be_faulty = self._story.current.actuator.has_reference_model
+        return opinion is not None and opinion.settles(self._story, may_be_faulty) and not self._bends()
+
+    def explains_better(self) -> bool:
+        """Whether, searched to its end, it explains what flowed better than the loop."""
+        opinion = self._ended()
+        return opinion is not None and opinion.explains_better(self._story)
+
+    def taken_over(self) -> Found:
+        """The story goes on without the controller."""
+        assert self._opinion is not None and self._found is not None
+        taken_over(self._story, self._opinion)
+        return self._found
+
+    def _ended(self) -> Opinion | None:
+        opinion = self.asked()
+        if opinion is not None and self._found is None:
+            self._found = Search(opinion.story, self._names, self._most, self._tell).ended()
+        return opinion
+
+    def _bends(self) -> bool:
+        """Whether a curve of the residual takes half of what the loop leaves, or all: a torque, no controller's."""
+        story = self._story
+        curve = story.curve(story.left().explanation, self._tell)
+        if curve is None:
+            return False
+        return at_floor(story.data, curve.fit) or curve.fit.error() < HALF * story.current.error()
+
+
+# --- what belongs together --------------------------------------------------------------------------------------------
+
+
+def _simplest(named: Sequence[Contender]) -> Contender:
+    """The most probable, or a term of its series that is not far less: the motion shows no more than that."""
+    first = named[0]
+    terms = () if first.trial.faults else find(first.trial.candidate.name).terms
+    near = [one for one in named if one.trial.candidate.name in terms and not first.is_told_apart_from(one)]
+    return near[0] if near else first
+
+
+def _without_series(others: Sequence[Trial]) -> list[Trial]:
+    """Those of which no term of the series is among them: what a constant does, an arm's weight does at some angle."""
+    names = {trial.candidate.name for trial in others}
+    return [trial for trial in others if names.isdisjoint(find(trial.candidate.name).terms)]
+
+
+def _of_other_parts(best: Trial, others: Sequence[Trial]) -> list[Trial]:
+    """Those that are of another part than the best: a drive's delays are alike, and any of them names the drive.
+
+    What has the best as a term of its series is the same, seen over a short travel.
+    """
+    name, is_drive = best.candidate.name, find(best.candidate.name).family == "drive"
+    apart = [trial for trial in others if name not in find(trial.candidate.name).terms]
+    return [trial for trial in apart if find(trial.candidate.name).family != "drive"] if is_drive else apart
+
+
+def _of_drive(one: Candidate) -> bool:
+    return one.name not in NAMES and find(one.name).family == "drive"
+
+
+def _further_orders(story: Story, orders: Sequence[float]) -> list[Fingerprint]:
+    """Fingerprints of the model's periodic effects at further orders, of these."""
+    found = story.current
+    present = found.actuator.effects
+    names = {name for key in present if (name := catalogue_name(key)) in CATALOGUE and CATALOGUE[name].is_periodic}
+    prints = []
+    for name in sorted(names):
+        known = [values["order"] for key, values in present.items() if catalogue_name(key) == name]
+        apart = [one for one in orders if all(abs(one - other) >= _APART for other in known)]
+        prints += fingerprints(story.data, found, [f"{name}_{len(known) + 1}"], apart)
+    return prints
+
+
+def _still_alike(story: Story, rivals: Sequence[Trial]) -> list[Trial]:
+    """An effect and its rivals, where the last model still has it and cannot tell it from them."""
+    known = {one.name: one.same_as for one in story.added}
+    names = known.get(rivals[0].candidate.name, ()) if rivals else ()
+    alike = [rival for rival in rivals[1:] if rival.candidate.name in names]
+    return [rivals[0], *alike] if alike else []
+
+
+def _with_curve(story: Story, curve: Trial | None, unknown: Explanation, tell: Progress) -> Explanation:
+    """Adds the curve of what is unknown, and tells what it stands for.
+
+    Parameters that only bent toward it go back: the curve is drawn beside the calibrated model, if one can be.
+    """
+    bent = story.steps[story.bare :]
+    whole = None
+    if bent:
+        try:
+            story.restart()
+            whole = story.left().explanation
+            curve = story.curve(whole, tell)
+        finally:  # also when it was stopped
+            story.steps += bent
+    if bent and curve and whole:
+        story.restart()
+        unknown = whole
+    curve = curve or story.curve(unknown, tell)
+    if curve:
+        story.add(curve)
+    return unknown

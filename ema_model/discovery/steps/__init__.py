@@ -1,1 +1,0 @@
-"""From a calibrated model to a verdict, step by step: what is added, weighed again and taken out."""

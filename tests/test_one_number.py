@@ -35,8 +35,8 @@ from ema_model.comparison.result import (
 )
 from ema_model.comparison.result import as_dict as compared_as_dict
 from ema_model.discovery import Discovery, discover, result_of, words
-from ema_model.discovery.result import Change, errors_of
 from ema_model.discovery.begin import begun
+from ema_model.discovery.result import Change, errors_of
 from ema_model.discovery.snapshot import Look, assessed, look_at
 from ema_model.estimation.calibrate import calibration_table, combination_in_words
 from ema_model.faults import NAMES

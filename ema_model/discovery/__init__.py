@@ -6,7 +6,6 @@ from ema_model.discovery.begin import begun
 from ema_model.discovery.discover import discover, result_of, settings_of
 from ema_model.discovery.history import Story
 from ema_model.discovery.result import Added, Candidate, Discovery, Experiment, Rung
-from ema_model.discovery.search import search
 from ema_model.discovery.verify import Verified, verified
 from ema_model.discovery.words import as_dict
 
@@ -22,7 +21,6 @@ __all__ = [
     "begun",
     "discover",
     "result_of",
-    "search",
     "settings_of",
     "verified",
 ]

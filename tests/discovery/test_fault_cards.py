@@ -51,9 +51,8 @@ def test_a_fault_is_a_card_that_is_added_taken_out_and_taken_back(faults):
     assessment = assessed(story)
     names = [one.name for one in assessment.candidates]
     assert FIRSTS <= set(names), "each fault is offered, an eccentricity once"
-    assert [one.predicted_drop for one in assessment.candidates] == sorted(
-        (one.predicted_drop for one in assessment.candidates), reverse=True
-    )
+    probable = [one.probability for one in assessment.candidates]
+    assert probable == sorted(probable, reverse=True)
     first = names[0]
     assert first == name or name in assessment.alike[first]
     one = card(assessment, name)

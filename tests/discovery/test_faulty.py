@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -9,13 +11,14 @@ from ema_model.actuator import load_actuator
 from ema_model.commands import command
 from ema_model.comparison.criteria import BAND
 from ema_model.discovery import discover
-from ema_model.discovery.candidates.faults import scored_faults, tried_faults
+from ema_model.discovery.begin import begun
 from ema_model.discovery.discover import result_of
 from ema_model.discovery.result import Change
-from ema_model.discovery.begin import begun
+from ema_model.discovery.search import Search
+from ema_model.discovery.terms import noise_of, terms_of
 from ema_model.discovery.words import as_dict
 from ema_model.estimation.model_fit import holdout_error
-from ema_model.faults import vector
+from ema_model.faults import CAUSES, vector
 from ema_model.recordings.measurement import Sensors
 from ema_model.simulation.run import Run, simulate_reference
 
@@ -83,13 +86,13 @@ def test_a_fault_stays_in_the_model_that_is_judged_shown_and_taken_back():
     recordings = [recorded(run, {"k2": 0.2}, seed=seed) for seed, run in enumerate((CHIRP, SINE))]
     story = begun(recordings, ACTUATOR, [recorded(UNSEEN, {"k2": 0.2}, seed=9)])
     healthy = story.current
-    trial = story.fault(story.faults(story.ranked()), lambda: [])
-    assert trial is not None and trial.faults == ("k2",) and trial.drop > 1e4
-    story.add(trial)
+    search = Search(story)
+    search.step()
     assert story.current.faults == ("k2",) and story.ladder[-1].change == Change("fault", ("k2",)) and not story.added
     assert story.held is not None
     assert holdout_error(story.held, story.current) < 1.1 < holdout_error(story.held, healthy)
-    assert story.fault(story.faults(story.ranked()), lambda: []) is None, "there is no second one"
+    search.step()
+    assert len(story.steps) == 2, "there is no second one"
     told = as_dict(result_of(story))
     assert told["faults"]["k2"]["value"] == pytest.approx(0.2, abs=0.02)
     story.restart()
@@ -98,9 +101,9 @@ def test_a_fault_stays_in_the_model_that_is_judged_shown_and_taken_back():
 
 
 def test_other_actuators_have_no_such_faults():
-    recordings = [recorded(CHIRP, {"k2": 0.2})]
-    story = begun(recordings, ACTUATOR)
-    servo = load_actuator("assets/actuators/xl330.toml")
-    other = type(story.current)(servo, story.current.plant, story.current.calibration, {})
-    assert scored_faults(story.data, other) == () and tried_faults(story.data, other, [], lambda text: None) == []
+    story = begun([recorded(CHIRP, {"k2": 0.2})], ACTUATOR)
+    servo = replace(story.current, actuator=load_actuator("assets/actuators/xl330.toml"))
+    noise = noise_of(story.data, story.current)
+    assert {one.name for one in terms_of(story.data, story.current, [], noise, [])} == {names[0] for names in CAUSES}
+    assert terms_of(story.data, servo, [], noise, []) == []
     assert np.all(story.current.calibration.k == vector({}))

@@ -6,9 +6,8 @@ import numpy as np
 import pytest
 
 from ema_model.actuator import load_actuator
-from ema_model.discovery.uncertainty import outside_tolerance
-from ema_model.discovery.uncertainty import with_intervals
 from ema_model.discovery.begin import calibrated_story
+from ema_model.discovery.uncertainty import outside_tolerance, with_intervals
 from ema_model.recordings import Measurement
 
 INERTIA, CONSTANT, FRICTION = 1e-4, 0.05, 0.01  # kg m², N·m/A, N·m

@@ -6,10 +6,11 @@ import numpy as np
 import pytest
 from support.hidden_effects import ACTUATOR, SINE, recorded
 
-from ema_model.discovery import as_dict, discover
-from ema_model.discovery.search import search
+from ema_model.discovery import as_dict, discover, search
 from ema_model.discovery.evidence import Unknowns, evidence_of, gains_of
-from ema_model.errors import InputError
+from ema_model.discovery.refit import Trial
+from ema_model.discovery.result import Candidate
+from ema_model.discovery.scoring import Evident
 from ema_model.estimation.noise import PIECE, NoiseModel
 
 _COUNT = 6 * PIECE
@@ -98,7 +99,7 @@ COMMANDS = [("chirp", {}, 0.5), SINE]
 def _found(effects, among=AMONG):
     held = recorded(41, commands=[("sine", {"amplitude_rad": 0.02, "frequency_Hz": 5}, 0.5)], effects=effects)
     fitted = recorded(41, commands=COMMANDS, effects=effects)
-    return discover(fitted, ACTUATOR, holdout=held, candidates=among, engine="evidence")
+    return discover(fitted, ACTUATOR, holdout=held, candidates=among)
 
 
 def test_a_hidden_effect_is_named_with_how_probable_it_is():
@@ -122,15 +123,68 @@ def test_what_promises_more_than_the_refitted_is_refitted_too(monkeypatch):
         for n, g in gains.items()
     ]
     real = {"best": -1.0, "next": 12.0, "third": 3.0}
-    story = SimpleNamespace(added=(), data=None, held=None)
-    of = search.Search(story, lambda text: None, None, 3)
-    monkeypatch.setattr(of, "_round", lambda: seen)
-    seen = SimpleNamespace(best=terms, beside=None, before=0.0, noise=None)
+    of = search.Search(SimpleNamespace(added=(), data=None, held=None))
+    before = Evident(0.0, 0.0, 0.0)
+    seen = search.Round(None, None, before, (), terms)
+    monkeypatch.setattr(of, "round", lambda: seen)
     monkeypatch.setattr(
         search, "fits", lambda job, chosen, tell: [SimpleNamespace(fit=one.candidate) for one in chosen]
     )
-    monkeypatch.setattr(search, "probability_of_fit", lambda data, held, fit, noise: (real[fit], 0.0))
+    monkeypatch.setattr(search, "evidence_of_fit", lambda data, held, fit, noise: Evident(real[fit], 0.0, 0.0))
     assert [(one.trial.fit, one.gain) for one in of._contenders()] == [("next", 12.0), ("best", -1.0)]
+
+
+# --- whether a closed loop is searched, and what stays of its rivals --------------------------------------------------
+
+DELAY, COGGING = Candidate("computation_delay", 550.0, {}), Candidate("cogging_torque", 600.0, {})
+
+
+@pytest.mark.parametrize(
+    ("ranked", "given", "untold", "suspected"),
+    [
+        ([DELAY, COGGING], {}, True, True),
+        ([COGGING, DELAY], {}, True, False),
+        ([Candidate("dead_band", 900.0, {})], {}, False, True),
+        ([DELAY], {"floors": 1.5}, False, False),
+        ([DELAY], {"simulates": False}, False, False),
+        ([DELAY, Candidate("k2", 900.0, {"k2": 0.2})], {}, False, True),
+    ],
+    ids=["a little of several", "an effect first", "one thing tells it well", "near", "without a loop", "a fault"],
+)
+def test_a_far_loop_is_untold_and_its_drive_suspected_where_that_tells_a_little(
+    monkeypatch, ranked, given, untold, suspected
+):
+    """A model that stands so many floors off, with these candidates, the most probable first, for a χ² of 1000."""
+    floors, simulates = given.get("floors", 50.0), given.get("simulates", True)
+    monkeypatch.setattr(search, "ratio", lambda data, found: floors)
+    current = SimpleNamespace(chi2=1000.0, plant=SimpleNamespace(simulates_commands=simulates))
+    of = search.Search(SimpleNamespace(data=None, current=current))
+    monkeypatch.setattr(of, "round", lambda: SimpleNamespace(best=[SimpleNamespace(candidate=one) for one in ranked]))
+    assert of.is_untold() is untold and of.suspects_drive() is suspected
+
+
+@pytest.mark.parametrize(
+    ("added", "alike"),
+    [
+        ([("pendulum_load", ("hinge_moment",))], ["pendulum_load", "hinge_moment"]),
+        ([("pendulum_load", ("hinge_moment", "friction_zone"))], ["pendulum_load", "hinge_moment", "friction_zone"]),
+        ([("pendulum_load", ())], []),
+        ([("inertia_error", ())], []),
+        ([], []),
+    ],
+    ids=["one", "both", "told apart since", "replaced", "taken out"],
+)
+def test_a_test_is_sought_only_for_rivals_of_the_last_model(added, alike):
+    story = SimpleNamespace(added=[SimpleNamespace(name=name, same_as=same) for name, same in added])
+    rivals = [
+        Trial(Candidate(name, 1.0, {}), {}, SimpleNamespace(), 1.0)
+        for name in ("pendulum_load", "hinge_moment", "friction_zone")
+    ]
+    assert [one.candidate.name for one in search._still_alike(story, rivals)] == alike
+    assert search._still_alike(story, []) == []
+
+
+# --- discoveries of recordings that the three-phase model made --------------------------------------------------------
 
 
 @pytest.mark.long
@@ -169,8 +223,3 @@ def test_no_second_effect_is_named_beside_one_of_the_drive(hidden, settings, fal
     found = _found({hidden: settings}, among=(hidden, false))
     assert [one.name for one in found.effects] == [hidden] and not found.faults
     assert found.ladder[-1].rmse < 1.1 and found.ladder[-1].holdout_rmse < 1.2
-
-
-def test_an_engine_that_is_not_there_is_refused():
-    with pytest.raises(InputError, match="no engine 'evidenc'; there are steps, evidence; did you mean 'evidence'"):
-        discover(recorded(41, commands=COMMANDS[:1]), ACTUATOR, engine="evidenc")

@@ -15,9 +15,9 @@ from ema_model.comparison.residuals import Residuals
 from ema_model.comparison.result import SignalError
 from ema_model.comparison.verdict import judge, most_of_floor
 from ema_model.discovery import as_dict, begun, result_of
+from ema_model.discovery.history import Step, rung_of
 from ema_model.discovery.result import VERDICTS, Contradiction
 from ema_model.discovery.snapshot import known_of
-from ema_model.discovery.history import Step, rung_of
 from ema_model.discovery.words import VERDICT_WORDS as IN_WORDS
 from ema_model.discovery.words import headline, sentences, so_far
 from ema_model.estimation.model_fit import floor_ratio

@@ -12,13 +12,14 @@ from typing import Any
 import numpy as np
 
 from ema_model.actuator import save_actuator
-from ema_model.discovery import Candidate, Story, search, verified
+from ema_model.discovery import Candidate, Story, verified
 from ema_model.discovery.history import Step
 from ema_model.discovery.next_experiment import next_experiment
 from ema_model.discovery.preview import Preview as Room
 from ema_model.discovery.preview import preview as room_for
 from ema_model.discovery.refit import Trial
 from ema_model.discovery.result import Experiment
+from ema_model.discovery.search import search
 from ema_model.discovery.snapshot import Look
 from ema_model.discovery.words import effect_title, verification
 from ema_model.effects import CATALOGUE

@@ -18,7 +18,7 @@ from ema_model.discovery.fingerprints import Fingerprint, fingerprints, may_act,
 from ema_model.discovery.observed.controller import ControllerSeen
 from ema_model.discovery.observed.transmission import TransmissionSeen
 from ema_model.discovery.observed.two_masses import TwoMasses
-from ema_model.discovery.refit import Trial, refitted, stands_for, without_fault
+from ema_model.discovery.refit import Trial, fitted_to_the_end, refitted, stands_for, without_fault
 from ema_model.discovery.remaining import Left, at_floor, left_by
 from ema_model.discovery.result import Added, Candidate, Change, Contradiction, Rung, StoodIn
 from ema_model.discovery.scoring import evidence_of_fit
@@ -271,7 +271,8 @@ class Story:
         data, held = self.data, self.held
         if moves_otherwise:
             data, held = data.beside(last.fit), None if held is None else held.beside(last.fit)
-        found = fit(data, last.fit.actuator, last.fit.starts, tell, last.fit.faults)  # tell may raise to stop
+        again = last.rung.change.kind == "fault" or before > FAR
+        found = fitted_to_the_end(data, last.fit, again, tell)  # tell may raise to stop
         self.steps.pop()
         if moves_otherwise:
             self.data, self.held = data, held
@@ -328,9 +329,14 @@ class Story:
         """Goes on as another story of the same recordings, by another model; its warnings come last."""
         self.data, self.held, self.steps = other.data, other.held, other.steps
         self.turned = other.turned
-        self.ties, self._calm, self.prints = other.ties, other._calm, other.prints
+        self.ties, self._calm = other.ties, other._calm
         self.refused = {**self.refused, **other.refused}
         self.warnings += other.warnings
+
+    def back_to_before(self, key: str) -> None:
+        """Takes an effect back, and all that was done since it was added."""
+        first = next(i for i, step in enumerate(self.steps) if any(one.key == key for one in step.added))
+        del self.steps[first:]
 
     def restart(self) -> None:
         """Takes all effects back."""

@@ -85,6 +85,16 @@ def together(
     return best
 
 
+def fitted_to_the_end(data: Data, found: Fit, again: bool, tell: Progress = lambda text: None) -> Fit:
+    """A rough fit's model, fitted to its very end.
+
+    again: also from the file's values, since parameters that stood in for what is new may lie beyond a ridge.
+    """
+    own = {name: x for name, x in found.starts.items() if name.startswith(("effects.", "k"))}
+    starts = [found.starts, own] if again else [found.starts]
+    return min((fit(data, found.actuator, one, tell, found.faults) for one in starts), key=lambda one: one.chi2)
+
+
 def free_key(current: Fit, name: str) -> str:
     """Under which a model can hold one more of an effect: `name`, or `name_2` beside one of its kind."""
     count = sum(catalogue_name(key) == name for key in current.actuator.effects)

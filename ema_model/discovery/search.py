@@ -36,8 +36,8 @@ from ema_model.discovery.inverse import Opinion, compared, second_opinion, taken
 from ema_model.discovery.objections import implausible, unmeasured, unsteady, within
 from ema_model.discovery.observed.transmission import transmission_seen
 from ema_model.discovery.observed.two_masses import two_masses_seen
-from ema_model.discovery.refit import Trial, refitted
-from ema_model.discovery.remaining import at_floor, ratio
+from ema_model.discovery.refit import Trial, fitted_to_the_end, refitted
+from ema_model.discovery.remaining import at_floor, ratio, within_band
 from ema_model.discovery.result import Candidate
 from ema_model.discovery.scoring import AboutFit, Evident, ScoredTerm, evidence_of_fit, places_of, scored_terms
 from ema_model.discovery.terms import Term, hidden, noise_of, terms_of
@@ -91,7 +91,7 @@ def _searched(story: Story, own: Search, beside: _Beside) -> Found:
     # A loop whose drive is another one is searched in vain; one that lacks a limit, which is not straight, tells so
     # only once that is refitted.
     if own.is_untold():
-        in_vain = own.drive_leaves() > left if own.suspects_drive() else beside.blames_controller()
+        in_vain = own.drive_leaves() > left and (own.suspects_drive() or beside.blames_controller())
     else:
         in_vain = own.suspects_drive() and beside.blames_controller() and own.drive_leaves() > left
     if in_vain and beside.settles():
@@ -200,6 +200,7 @@ class Search:
         self._exchanges: set[tuple[str, str]] = set()  # that were tried
         self._made: list[Term] = []  # all Terms of effects, beside an earlier model
         self._hidden: Sequence[Candidate] = ()
+        self._barred: set[str] = set()  # effects that were added, and spoken against once all was there
 
     # --- whether a closed loop is worth a search ----------------------------------------------------------------------
 
@@ -238,10 +239,9 @@ class Search:
 
     def _go_to_the_end(self) -> None:
         """Adds, exchanges and takes out what makes the model more probable."""
-        while self._going:
-            self.step()
-        while self._exchanged() or self._doubtful():
-            pass
+        while self._going or self._exchanged() or self._doubtful():
+            while self._going:
+                self.step()
 
     def step(self) -> None:
         """The most probable Term into the model; beside as many effects as are asked for, a fault alone.
@@ -296,11 +296,13 @@ class Search:
         if self._refitted is None or self._refitted[0] is not seen:
             is_full = len({one.name for one in story.added}) >= self._most
             room = [one for one in seen.best if one.term.fingerprint is None or not is_full]
+            room = [one for one in room if one.candidate.name not in self._barred]
+            might = 0.0 if self._is_far() else MIGHT  # so far off, what is straight tells little
             found: list[Contender] = []
             best = -math.inf
             while len(found) < _REFITTED:
                 left = [one for one in room[len(found) :] if one.gain > max(WORTH_A_REFIT, best)]
-                chosen = [one for one in left if one.gain > MIGHT * left[0].gain][: _REFITTED - len(found)]
+                chosen = [one for one in left if one.gain > might * left[0].gain][: _REFITTED - len(found)]
                 if not chosen:
                     break
                 trials = fits(self._refit, chosen, self.tell)
@@ -310,8 +312,13 @@ class Search:
         return self._refitted[1]
 
     def _refit(self, one: ScoredTerm, tell: Progress) -> Trial:
-        """A Term in the last model, refitted from where the algebra has it."""
-        return refitted(self.story.data, self.story.current, one.candidate, one.start, tell, key=one.term.name)
+        """A Term in the last model, refitted from where the algebra has it; far off, what tells most, to its end."""
+        story = self.story
+        trial = refitted(story.data, story.current, one.candidate, one.start, tell, key=one.term.name)
+        if not self._is_far() or trial.drop < TOLD_WELL * story.current.chi2:
+            return trial
+        ended = fitted_to_the_end(story.data, trial.fit, True, tell)
+        return replace(trial, fit=ended, drop=story.current.chi2 - ended.chi2)
 
     # --- one step -----------------------------------------------------------------------------------------------------
 
@@ -351,7 +358,7 @@ class Search:
         reason = "" if found.calibration.converged else "the fit with it did not converge"
         for key in one.trial.effects:
             reason = reason or unmeasured(story.data, key) or within(story.current, found, key)
-            reason = reason or implausible(found, key) or self._idle(found)
+            reason = reason or implausible(found, key) or self._idle(found) or self._denied(one)
             if not reason and at_floor(story.data, found):
                 reason = unsteady(story.data, found, key)
         if reason:
@@ -362,9 +369,13 @@ class Search:
         """Whether the error that is told does not fall: a verdict says no more than its ladder."""
         data, current = self.story.data, self.story.current
         first, last = (floor_ratio(data, one.plant, one.calibration.signals) for one in (current, found))
-        if first <= 1.0:
-            return "without it no more than the floor is left"
+        if within_band(data, current):
+            return "without it no more is left than a true model leaves"
         return "" if last < (1.0 - LEAST_FALL) * first else "the error does not fall with it"
+
+    def _denied(self, one: Contender) -> str:
+        """Whether what was held out is far less probable with it."""
+        return "what was held out speaks against it" if one.gain < one.fitted - NAMED else ""
 
     def _turned_back(self, contenders: Sequence[Contender]) -> bool:
         """Turns back the encoder of held-out recordings that deny what the fitted ones show; whether any was."""
@@ -383,13 +394,18 @@ class Search:
     # --- what is taken out again, or put in the place of another ------------------------------------------------------
 
     def _doubtful(self) -> bool:
-        """Takes out an effect of which, in the last model, each recording asks for another value."""
+        """Goes back to before an effect of which, in the last model, each recording asks for another value.
+
+        What was added after it was found beside a wrong one.
+        """
         story = self.story
-        for one in reversed(story.added):
+        for one in story.added:
             reason = implausible(story.current, one.key) or unsteady(story.data, story.current, one.key)
             if reason and one.name in CATALOGUE:
                 story.refused[one.name] = reason
-                story.remove(one.key)
+                self._barred.add(one.name)
+                story.back_to_before(one.key)
+                self._going = True
                 return True
         return False
 

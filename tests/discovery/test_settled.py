@@ -7,7 +7,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from ema_model.discovery.evidence import uncertainty
+from ema_model.discovery import uncertainty
 from ema_model.estimation.model_fit import Data
 
 DRIVEN = ("motor.a", "motor.b", "motor.c", "motor.d")  # one after another, as the one before is held

@@ -16,7 +16,7 @@ from ema_model.comparison.result import SignalError
 from ema_model.comparison.verdict import judge, most_of_floor
 from ema_model.discovery import as_dict, begun, result_of
 from ema_model.discovery.history import Step, rung_of
-from ema_model.discovery.result import VERDICTS, Contradiction
+from ema_model.discovery.result import VERDICTS, Candidate, Contradiction
 from ema_model.discovery.snapshot import known_of
 from ema_model.discovery.words import VERDICT_WORDS as IN_WORDS
 from ema_model.discovery.words import headline, sentences, so_far
@@ -62,7 +62,7 @@ def lacking():
     """The calibrated model of a plant with a hidden effect, and the same with it."""
     story = begun(recorded(31, effects=CLEAR), ACTUATOR)
     bare = replace(story, steps=list(story.steps))
-    story.add(story.trial(next(one for one in story.ranked(tuple(CLEAR)))))
+    story.add(story.trial(Candidate(*CLEAR, 0.0, next(iter(CLEAR.values())))))
     return bare, story
 
 

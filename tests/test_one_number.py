@@ -369,14 +369,14 @@ def looked_at() -> Look:
 
 def test_cards_stand_in_the_order_of_their_bars():
     look = looked_at()
-    shares = [look.share(one) for one in look.promising]
-    assert len(shares) > 1 and shares == sorted(shares, reverse=True) and max(shares) <= 1.0
+    probable = [look.probability(one) for one in look.promising]
+    assert probable and probable == sorted(probable, reverse=True) and max(probable) <= 1.0
     style = candidate.style(look, [(f"card {i}", one) for i, one in enumerate(look.promising)], None)
     bars = [float(one) for one in re.findall(r"linear-gradient\(to right,[^ ]+ ([\d.]+)%", style)]
-    assert bars == [pytest.approx(100.0 * share, abs=0.05) for share in shares]
-    for one, share in zip(look.promising, shares):
+    assert bars == [pytest.approx(100.0 * one, abs=0.05) for one in probable]
+    for one, share in zip(look.promising, probable):
         text, head = candidate.label(look, one), plain(candidate.head(look, one))
-        assert f"{100.0 * share:.0f} % of it" in text and candidate.confidence(look, one) in head
+        assert f"{words.in_percent(share)} probable" in text and candidate.confidence(look, one) in head
         assert not unstated(text + head, [look.rmse, look.predicted_rmse(one)])
 
 

@@ -91,6 +91,5 @@ SHARED = 0.5
 
 # --- how candidates are shown -----------------------------------------------------------------------------------------
 
-# Fall of χ² at the candidate's best size, from which on a card calls its evidence strong, and moderate; and from which
-# on it stands among those that are worth a look.
-EVIDENCE, WORTH_A_LOOK = (200.0, 50.0), 10.0
+# Fall of χ² at the candidate's best size, from which on it stands among those that are worth a look.
+WORTH_A_LOOK = 10.0

@@ -14,7 +14,7 @@ from ema_model.comparison.explain import Explanation
 from ema_model.comparison.free_simulation import Simulated
 from ema_model.comparison.loop_lag import LoopLag
 from ema_model.comparison.regions import Event
-from ema_model.discovery.criteria import EVIDENCE, FAR
+from ema_model.discovery.criteria import FAR
 from ema_model.discovery.observed.controller import ControllerSeen
 from ema_model.discovery.observed.repeated import Repeated
 from ema_model.discovery.observed.transmission import TransmissionSeen
@@ -48,7 +48,7 @@ class Candidate:
     untestable_reason: str = ""
     refitted_drop: float | None = None  # of χ², where it was refitted
     cannot_represent: str = ""  # why the model has no place for it, whatever is recorded
-    probability: float | None = None  # that this, of all candidates or none, is missing; None: of the engine by steps
+    probability: float | None = None  # that this, of all candidates or none, is missing; None: not asked
 
     @property
     def obstacle(self) -> str:
@@ -61,12 +61,6 @@ class Candidate:
     def drop(self) -> float:
         """The fall of χ²: that of the refit, or the predicted one where there was none."""
         return self.predicted_drop if self.refitted_drop is None else self.refitted_drop
-
-    @property
-    def evidence(self) -> str:
-        """How strong it is that something like this is missing: "strong", "moderate" or "weak"."""
-        strong, moderate = EVIDENCE
-        return "strong" if self.predicted_drop > strong else "moderate" if self.predicted_drop > moderate else "weak"
 
 
 @dataclass(frozen=True)

@@ -332,7 +332,6 @@ class Search:
         name = first.trial.candidate.name
         alike = [one.trial for one in named if one is not first and not first.is_told_apart_from(one)]
         as_probable = {one.candidate.name for one in [first.trial, *alike]}  # terms of a series among them
-        alike = [trial for trial in alike if trial.faults or name not in find(trial.candidate.name).terms]
         faults = [trial for trial in alike if trial.faults]
         effects = _without_series([trial for trial in alike if not trial.faults])
         others = [*effects, *faults]
@@ -475,7 +474,8 @@ class Search:
         trial = refitted(story.data, smaller, candidate, smaller.starts, tell, key=term.name)
         after = evidence_of_fit(story.data, story.held, trial.fit, seen.noise).log
         gain = after + term.log_share - seen.before.log
-        if gain < 0.0:
+        is_its_term = not trial.faults and catalogue_name(key) in find(candidate.name).terms
+        if gain < (NAMED if is_its_term else 0.0):
             if key not in NAMES:
                 story.tie(key, candidate.name, gain > -NAMED)
             return False

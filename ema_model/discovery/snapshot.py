@@ -78,6 +78,12 @@ class Look:
         """Whether so much would hardly be chance."""
         return one.predicted_drop > WORTH_A_LOOK
 
+    def probability(self, one: Candidate) -> float:
+        """That a candidate is missing, or what looks like it, before any refit."""
+        names = {one.name, *(self.assessment.alike.get(one.name, ()) if self.assessment else ())}
+        known = self.assessment.candidates if self.assessment else [one]
+        return min(1.0, sum(other.probability or 0.0 for other in known if other.name in names))
+
     def predicted_rmse(self, one: Candidate) -> float:
         """The error with a candidate in the model, in floors, before any refit."""
         return min(self.error_with(one), self.rmse)

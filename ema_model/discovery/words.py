@@ -557,9 +557,7 @@ class AddedJson(TypedDict):
     holdout_rmse_after: Annotated[float | None, Meta(description="of what was not fitted, with it; null: nothing")]
     same_as: Annotated[list[str], Meta(description="effects and faults that these recordings cannot tell from it")]
     supported_by: Annotated[list[str], Meta(description="the models that bear it out: closed_loop, inverse_dynamics")]
-    probability: Annotated[
-        float | None, Meta(description="that it, or one of same_as, is missing; null: --engine steps, or a curve")
-    ]
+    probability: Annotated[float | None, Meta(description="that it, or one of same_as, is missing; null: a curve")]
 
 
 class RungJson(TypedDict):
@@ -591,9 +589,7 @@ class CandidateJson(TypedDict):
     settings: Annotated[dict[str, float | None], Meta(description="its best settings, by the names in files")]
     untestable_reason: Annotated[str, Meta(description="why these recordings cannot show it; empty where they can")]
     cannot_represent: Annotated[str, Meta(description="why this model has no place for it; empty where it has one")]
-    probability: Annotated[
-        float | None, Meta(description="that this, of all candidates or none, is missing; null: --engine steps")
-    ]
+    probability: Annotated[float | None, Meta(description="that this, of all candidates or none, is missing")]
 
 
 class UnknownJson(TypedDict):

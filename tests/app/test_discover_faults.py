@@ -59,7 +59,7 @@ def test_start_offers_the_fault_beside_the_effects(rig):
     assert best.name == "k2" and look.share(best) > 0.5
     text = candidate.label(look, best)
     assert text.startswith("Backlash (fault k2)\nerror ") and "backlash " in text and "µrad, k2 ≈ 0." in text
-    assert "strong evidence" in text
+    assert "% probable" in text
     assert "Physics is missing, or the actuator has a fault." in answer(look)
     shown = discovery.signature(look, best)
     assert len(shown.data) == 2 and "backlash (fault k2) would change" in shown.data[1].name

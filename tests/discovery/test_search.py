@@ -127,6 +127,7 @@ def test_what_promises_more_than_the_refitted_is_refitted_too(monkeypatch):
     before = Evident(0.0, 0.0, 0.0)
     seen = search.Round(None, None, before, (), terms)
     monkeypatch.setattr(of, "round", lambda: seen)
+    monkeypatch.setattr(of, "_is_far", lambda: False)
     monkeypatch.setattr(
         search, "fits", lambda job, chosen, tell: [SimpleNamespace(fit=one.candidate) for one in chosen]
     )

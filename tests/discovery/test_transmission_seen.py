@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
@@ -87,9 +88,10 @@ def test_it_needs_both_positions(healthy):
 
 
 def test_nothing_is_adequate_beside_it(monkeypatch):
-    monkeypatch.setattr("ema_model.discovery.steps.verdict.explains_all", lambda story: True)
-    monkeypatch.setattr("ema_model.discovery.steps.verdict.lasts", lambda data, found: False)
-    monkeypatch.setattr("ema_model.discovery.steps.verdict.silence", lambda *_: "")
+    verdicts = sys.modules[verdict_of.__module__]
+    monkeypatch.setattr(verdicts, "explains_all", lambda story: True)
+    monkeypatch.setattr(verdicts, "lasts", lambda data, found: False)
+    monkeypatch.setattr(verdicts, "silence", lambda *_: "")
     found = SimpleNamespace(calibration=SimpleNamespace(converged=True))
     named: Any = object()
     story: Any = SimpleNamespace(

@@ -12,7 +12,7 @@ import viser
 from ema_model.actuator import Actuator
 from ema_model.discovery import Candidate
 from ema_model.discovery.snapshot import Look
-from ema_model.discovery.words import effect_title, page_of, size
+from ema_model.discovery.words import effect_title, in_percent, page_of, size
 from ema_model.discovery.words import typical as typical_fault
 from ema_model.discovery.words import value as as_fitted
 from ema_model.effects import Effect, find
@@ -79,8 +79,9 @@ def strength(look: Look, one: Candidate) -> str:
 
 
 def confidence(look: Look, one: Candidate) -> str:
-    """How strong the evidence is that something like this is missing: 'strong evidence (Δχ² −405, 62 % of it)'."""
-    return f"{one.evidence} evidence (Δχ² −{one.predicted_drop:.0f}, {100.0 * look.share(one):.0f} % of it)"
+    """How probable it is that this is missing, and how much it would do: '97 % probable, 62 % of the squared error'."""
+    probable = in_percent(look.probability(one))
+    return f"{probable} probable, {100.0 * look.share(one):.0f} % of the squared error"
 
 
 def style(look: Look | None, shown: Sequence[tuple[str, Candidate | None]], opened: str | None) -> Html:
@@ -90,9 +91,10 @@ def style(look: Look | None, shown: Sequence[tuple[str, Candidate | None]], open
         if one is None or look is None:
             continue
         button = f'[id="{uuid}"]'
-        share = 100.0 * look.share(one) if look.is_worth(one) else 0.0
-        bar = f"background-image:linear-gradient(to right,{_BAR} {share:.1f}%,transparent {share:.1f}%)!important;"
-        edge = "#f08c00" if one.name == opened else "rgba(134,142,150,.5)" if share else "rgba(134,142,150,.25)"
+        worth = look.is_worth(one)
+        wide = 100.0 * look.probability(one) if worth else 0.0
+        bar = f"background-image:linear-gradient(to right,{_BAR} {wide:.1f}%,transparent {wide:.1f}%)!important;"
+        edge = "#f08c00" if one.name == opened else "rgba(134,142,150,.5)" if worth else "rgba(134,142,150,.25)"
         grey = "opacity:.55;" if one.obstacle else ""
         rules.append(f"{button}{{{_CARD}{bar}{grey}border-left:3px solid {edge}}}")
         rules.append(f"{button} .mantine-Button-inner{{justify-content:flex-start}}")

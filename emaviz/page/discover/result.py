@@ -17,7 +17,9 @@ from ema_model.discovery.snapshot import Look
 from ema_model.discovery.words import (
     FLOOR_NOTE,
     Track,
+    effect_title,
     headline,
+    in_percent,
     next_experiment,
     per_recording,
     sentences,
@@ -26,7 +28,9 @@ from ema_model.discovery.words import (
 )
 from ema_model.effects import CATALOGUE
 from ema_model.errors import InputError
-from ema_model.faults import BY_NAME, HEALTHY
+from ema_model.faults import HEALTHY
+from ema_model.quantities.numbers import number
+from ema_model.quantities.titles import in_sentence
 from ema_model.recordings import SIGNALS, Measurement
 from emaviz.figures import discovery
 from emaviz.figures.discovery import equation
@@ -321,9 +325,12 @@ def answer(look: Look) -> Html:
     elif not look.added and not found.faults and look.promising and not found.not_claimed:
         # Nothing was added, of which a verdict could speak, and nothing was tried in vain.
         left = look.assessment.left.explanation
-        best, meaning = look.promising[0].name, "warning"
-        may_be_worn = any(name in BY_NAME for name in (best, *look.assessment.alike.get(best, ())))
-        first = "Physics is missing, or the actuator has a fault." if may_be_worn else "Physics is missing."
+        best, meaning = look.promising[0], "warning"
+        before, after = number(look.rmse), number(look.predicted_rmse(best))
+        first = (
+            f"Next: {in_sentence(effect_title(best.name))}, {in_percent(look.probability(best))} probable, would bring "
+            f"the error from {before} to about {after} times the floor."
+        )
         others = [sentences(found)[0], *([left.sentence] if left is not None else [])]
     else:
         first, others = headline(found), sentences(found)

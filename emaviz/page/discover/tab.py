@@ -190,7 +190,7 @@ def step(look: Look | None, running: bool, opened: str | None, revealed: bool) -
     if not look.removable and opened is None:
         return 3, html(
             "Even calibrated, the error is <b>{} times the floor</b>: physics is missing. "
-            "Click the <b>first card</b> below: its bar is the share of the squared error (χ²) that it would remove.",
+            "Click the <b>first card</b> below: its bar is how probable it is that this is missing.",
             number(look.rmse),
         )
     if not look.removable:
@@ -577,7 +577,7 @@ class DiscoverPanel:
         if look.assessment is None:
             return "Analysing the residual and scoring the library's effects and the actuator's faults …"
         if look.promising:
-            bar = "The bar is the share of the squared error (χ²) that it would remove."
+            bar = "The bar is how probable it is that this, of all candidates, is missing."
             return f"{bar} Click a card to see why, and to add it."
         if look.assessment.left.explanation is not None and not look.found.at_floor:
             return "No candidate explains the residual: try its curve, or an expression of your own, below."

@@ -12,7 +12,7 @@ from support.rig import Rig
 from ema_model.actuator import load_actuator
 from ema_model.challenges.truth import Truth
 from ema_model.comparison.criteria import BAND
-from ema_model.discovery.criteria import LEAST_BIC
+from ema_model.discovery.criteria import WORTH_A_LOOK
 from ema_model.discovery.result import Change
 from ema_model.discovery.words import faults, headline, sentences
 from ema_model.errors import InputError
@@ -79,7 +79,7 @@ def test_what_was_tried_in_vain_is_told_with_its_reason(rig):
 def test_it_is_added_by_its_name(worn):
     look = worn.look
     assert list(look.found.faults) == ["k2"] and not look.added
-    assert all(one.predicted_drop < 2.0 * LEAST_BIC for one in look.promising), "what is left asks for no effect"
+    assert all(one.predicted_drop < 2.0 * WORTH_A_LOOK for one in look.promising), "what is left asks for no effect"
     assert [rung.change for rung in look.found.ladder] == [Change(), Change("fault", ("k2",))]
     assert look.rmse < BAND < look.found.ladder[0].rmse
     assert headline(look.found) == "No physics is missing: the actuator has the fault k2 backlash."

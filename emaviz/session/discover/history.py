@@ -188,7 +188,7 @@ class Telling:
     @property
     def is_assessed(self) -> bool:
         """Whether it is known what may be missing from the last model."""
-        return self.story.steps[-1] in self.known
+        return known_of(self.story.steps[-1], self.known) is not None
 
     def assess(self) -> None:
         """Looks at what the last model leaves; takes a second, and the first time a compilation."""
@@ -212,7 +212,7 @@ class Telling:
         """A picture of the story as it stands."""
         story = self.story
         found = result_of(story, self.first, self._unknown(), self.experiment)
-        return look_at(story, found, self.known.get(story.steps[-1]), known_of(story.steps[0], self.known))
+        return look_at(story, found, known_of(story.steps[-1], self.known), known_of(story.steps[0], self.known))
 
     def _unknown(self) -> Explanation | None:
         """What is left by the last model; with a torque of no name in it, what that one stands in for."""

@@ -331,7 +331,9 @@ class Search:
         first = _simplest(named)
         name = first.trial.candidate.name
         alike = [one.trial for one in named if one is not first and not first.is_told_apart_from(one)]
-        as_probable = {one.candidate.name for one in [first.trial, *alike]}  # terms of a series among them
+        as_probable = {one.candidate.name for one in [first.trial, *alike]}
+        # What it is a term of is the same, seen over a short travel: told where nothing else is.
+        alike = [trial for trial in alike if trial.faults or name not in find(trial.candidate.name).terms] or alike
         faults = [trial for trial in alike if trial.faults]
         effects = _without_series([trial for trial in alike if not trial.faults])
         others = [*effects, *faults]

@@ -20,6 +20,7 @@ from ema_model.simulation import plant
 from emaviz.page import compare, explore
 from emaviz.page.charts import add_chart_tools
 from emaviz.page.explore.tab import ExploreTab
+from emaviz.page.job_bar import JobBar
 from emaviz.page.measure import Measuring, add_measuring
 from emaviz.page.panel import follow_theme
 from emaviz.page.playback import PlaybackStrip
@@ -181,6 +182,7 @@ class App:
         self.scene = ActuatorScene(self.server, round(actuator.motor.pole_pairs))
         self.strip = PlaybackStrip(self.page, self.scene, actuator, self._theme)
         self.playback = self.strip.playback
+        self.job_bar = JobBar(self.page, self._slow_screen)
         self.shared = Shared(
             self.page,
             self.strip,
@@ -224,6 +226,7 @@ class App:
     def close(self) -> None:
         """Ends everything that was started."""
         self.playback.close()
+        self.job_bar.close()
         self.standings.close()
         for one in self.shared.tabs.values():
             one.close()

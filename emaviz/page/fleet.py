@@ -148,7 +148,7 @@ class UnitsPanel:
         )
         self._actuator: Any = gui.add_dropdown("Actuator", (comparing.actuator_name,), hint="The units' type")
         self._start = gui.add_button("Compare units", icon=WORKSPACE.icon, disabled=True)
-        self._line = JobLine(page, comparing.job, pauses="it")
+        self._line = JobLine(page, comparing.job, WORKSPACE, pauses="it")
         self._rule.on_update(lambda event: event.client and post("units rule", self._take_rule))
         self._actuator.on_update(lambda event: event.client and post("units actuator", self._take_actuator))
         self._start.on_click(lambda _: post("compare units", self._begin))

@@ -11,7 +11,7 @@ import viser
 
 from ema_model.text import InWords
 from emaviz.page.style import IN_ROW
-from emaviz.page.workspaces import Page
+from emaviz.page.workspaces import Page, Workspace
 from emaviz.recording.viewer import ViewerHost
 from emaviz.server.viser_private import Inside
 from emaviz.session.data_folder import DataFolder
@@ -69,8 +69,12 @@ def recording_link(viewer: ViewerHost | None, path: Path, text: str = "") -> Htm
 class JobLine:
     """A line of text; while the job runs, a bar, what goes on, and how long it still takes where that is known."""
 
-    def __init__(self, page: Page, job: Job, *, stop: str = "Stop", pauses: str = "") -> None:
-        """stop: the button's label; pauses: what its other button pauses, as in 'the search', or none."""
+    def __init__(self, page: Page, job: Job, at: Workspace, *, stop: str = "Stop", pauses: str = "") -> None:
+        """at: to which the job bar leads; stop: the button's label.
+
+        pauses: what its other button pauses, as in 'the search', or none.
+        """
+        page.job_tabs[job] = at.name
         self._page, self._job, self._pauses = page, job, pauses
         self._title = self._waited = ""
         self._stopping = False

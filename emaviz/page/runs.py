@@ -554,6 +554,7 @@ class RunsTab(Tab):
         self.sessions = SessionControls(page, shared.comparing, shared.files, shared.kept, shared.standings.lines)
         CampaignControls(
             page,
+            WORKSPACE,
             shared.campaigns,
             shared.files,
             self.right,

@@ -365,7 +365,7 @@ class ComparePanel:
             self._remove = gui.add_button("Remove", icon=viser.Icon.X, color="gray", visible=False)
         self._mapping = MappingStep(page, comparing, result.preview)
         self._start = gui.add_button("Compare", icon=viser.Icon.ARROWS_DIFF)
-        self._line = JobLine(page, comparing.job)
+        self._line = JobLine(page, comparing.job, WORKSPACE)
         self._health_folder = gui.add_folder("Data health", visible=False)
         with self._health_folder:
             self._health = add_html(gui)

@@ -399,7 +399,7 @@ class DiscoverPanel:
             visible=False,
             hint="Adds, step by step, every effect and fault that the data support",
         )
-        self._line = JobLine(page, discovering.job)
+        self._line = JobLine(page, discovering.job, WORKSPACE)
         self._cards_folder = gui.add_folder("What may be missing", visible=False)
         with self._cards_folder:
             self._style = add_html(gui)
@@ -453,7 +453,7 @@ class DiscoverPanel:
         self._page.begins(begin, button)
 
     def _begin(self) -> None:
-        if not self._page.begins(self._discovering.start, self._start):
+        if not self._page.begins(self._discovering.start, self._start, "Discover"):
             self._discovering.provenance.refused()
 
     def _forget_errors(self) -> None:

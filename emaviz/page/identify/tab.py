@@ -76,7 +76,7 @@ class IdentifyPanel:
         ):
             self._listen(entry, partial(settings.set, name))
         self._start = gui.add_button("Identify", icon=viser.Icon.SEARCH)
-        self._line = JobLine(page, page.session.identifying.job, pauses="the search")
+        self._line = JobLine(page, page.session.identifying.job, WORKSPACE, pauses="the search")
         self._line.say("Finds the faults from the current alone.")
         self._text = add_html(gui)
         self._link = add_html(gui)

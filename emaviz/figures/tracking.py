@@ -103,10 +103,10 @@ def k_so_far(flights: Sequence[Flight], count: int, *, dark: bool = False) -> go
     chart = theme.new("k of each flight so far", "Flight", "k [-]", dark=dark)
     at = [i for i, one in enumerate(flights, 1) if not one.excluded]
     k = to_k(np.array([one.k for one in flights if not one.excluded]).reshape(-1, len(NAMES)))
-    for i, name in enumerate(NAMES):
-        if name in TRACKED:
-            style = {"mode": "lines+markers", "line": {"color": CASES[i % len(CASES)], "width": 1.5}}
-            chart.add_trace(go.Scatter(x=at, y=k[:, i], name=BY_NAME[name].label, marker={"size": 5}, **style))
+    for i, name in enumerate(TRACKED):
+        line = {"color": CASES[i % len(CASES)], "width": 1.5, "dash": "dot" if i >= len(CASES) else "solid"}
+        y, style = k[:, NAMES.index(name)], {"mode": "lines+markers", "marker": {"size": 5}, "line": line}
+        chart.add_trace(go.Scatter(x=at, y=y, name=BY_NAME[name].label, **style))
     chart.update_xaxes(range=[0.5, max(count, LEAST_FLIGHTS) + 0.5])
     chart.update_yaxes(range=[-0.05, 1.05])
     return chart

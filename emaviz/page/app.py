@@ -24,6 +24,7 @@ from emaviz.page.job_bar import JobBar
 from emaviz.page.measure import Measuring, add_measuring
 from emaviz.page.panel import follow_theme
 from emaviz.page.playback import PlaybackStrip
+from emaviz.page.share import Sharing
 from emaviz.page.tab import AnyTab, Shared, Standings, Tab
 from emaviz.page.window_layout import LEFT_PX, Docked
 from emaviz.page.workspaces import Page, Workspace, Workspaces
@@ -140,6 +141,7 @@ class App:
             lambda: self.viewer.address if self.viewer else None,
             data.scene,
             self.measuring.answer,
+            lambda *asked: self.sharing.answer(*asked),
         )
         self.viewer, no_viewer = _viewer(recordings)
         self.session = Session(actuator, recordings)
@@ -151,10 +153,12 @@ class App:
         self.workspaces = Workspaces(self.server, self.screen, self._docked, first.name)
         self.page = Page(self.server, self.session, self.screen, self.workspaces, self.measuring, data.folder)
         self.standings = Standings(self.screen, self.workspaces)
+        self.sharing = Sharing(self.page, self.viewer)
         self.comparing = Comparing(self.session, data)
         self.session.open_file, self.session.version_of = self.comparing.measurement, self.comparing.version
         self.discovering = Discovering(self.session, self.comparing)
         self.campaigns = Campaigns(self.session, data, campaigns)
+        self.sharing.files = self.campaigns.report
         self._build()
         self._first = threading.Event()
         self.first_picture_s = 0.0
@@ -194,9 +198,11 @@ class App:
             self._slow_screen,
             self._files,
             self.standings,
+            self.sharing,
         )
         for kind, panel in zip(kinds, panels):
             self.shared.tabs[kind] = kind(self.shared, panel)
+        self.sharing.connect({kind.workspace.name: one for kind, one in self.shared.tabs.items()})
         self._docked.dock()
         group = gui.add_tab_group()
         for kind, one in self.shared.tabs.items():

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
+from urllib.parse import quote
 
 import plotly.graph_objects as go
 import viser
@@ -14,10 +15,12 @@ from ema_model.errors import InputError
 from ema_model.recordings import Measurement
 from emaviz.figures.campaign import counted
 from emaviz.page.panel import JobLine
+from emaviz.page.share import Place
 from emaviz.page.tab import Standing
 from emaviz.page.workspaces import Page, Workspace
 from emaviz.report.campaign import Rows, answers, errors_drawn, of_known_truth
-from emaviz.session.campaigns import Campaigns, Computing
+from emaviz.server.safe_server import RESULTS
+from emaviz.session.campaigns import REPORT, Campaigns, Computing
 from emaviz.session.inputs import Provenance
 from emaviz.session.jobs import Worker
 from emaviz.text.html import Html, add_html, begin, html, joined, said
@@ -32,7 +35,7 @@ _STEPS = (
     "Rows, errors and answers are drawn here as they come; a Stop keeps them, and it goes on from there.",
 )
 _THESIS = {"thesis_quick": "thesis: reproduce it, quick", "thesis": "thesis: reproduce it, whole"}
-_MOST_FIGURES, _ASPECT = 2, 0.42
+_MOST_FIGURES, _ASPECT = 2, 0.32
 _MOST_ROWS = 500  # that can be chosen from: of a group, the errors and the worst first
 _BOX = Html('style="padding:2px 10px;font-size:12.5px;line-height:1.45"')
 
@@ -70,6 +73,7 @@ class CampaignControls:
         standing.connect(again)
         with panel.add_tab(_TAB, viser.Icon.TABLE):
             standing.add(gui)
+            self._links = add_html(gui)
             self._progress = add_html(gui, begin("No campaign is here yet", _STEPS))
             self._figures = [
                 gui.add_plotly(go.Figure(), config={"displayModeBar": False}, aspect=_ASPECT, visible=False)
@@ -82,8 +86,21 @@ class CampaignControls:
         again.on_click(lambda _: self._post(self.refresh))
         campaigns.computing.began.connect(lambda _: self._begun())
         campaigns.grown.connect(lambda name: self._post(lambda: self._grow(name)))
+        campaigns.written.connect(lambda name, _: self._post(lambda: self._grow(name)))
         campaigns.opened.connect(lambda path, run: self._post(lambda: opened(path, run)))
         self._post(self.refresh)
+
+    def place(self) -> Place:
+        """The campaign that is shown."""
+        name = str(self._choice.value)
+        return {} if name == NONE else {"campaign": [name]}
+
+    def choose(self, name: str) -> None:
+        """Another campaign by its name; InputError where there is none."""
+        self._campaigns.store(name)
+        self._choice.options, self._choice.value = self._campaigns.names(), name
+        self._page.workspaces.bring_forward(self._at.name, "", _TAB)
+        self._post(self._show)
 
     # --- on the files' thread ---------------------------------------------------------------------------------------
 
@@ -103,10 +120,18 @@ class CampaignControls:
         self._group.options = list(store.header.kinds) or [NONE]
         self._provenance.take()
         self._progress.content = progress_bars(store)
+        self._links.content = self._reports(name)
         self._draw(store)
         self._tables.content = tables(store)
         self._say(_progress(store))
         self._show_rows()
+
+    def _reports(self, name: str) -> Html:
+        """A link to what was written of it."""
+        if self._campaigns.report(f"{name}/{REPORT}") is None:
+            return Html()
+        at = f"{RESULTS}{quote(name)}/{REPORT}"
+        return html('<div class="emaviz-report"><a href="{}" target="_blank" rel="noopener">Report ↗</a></div>', at)
 
     def _draw(self, store: Store) -> None:
         """What the rows say so far, as figures."""
@@ -218,8 +243,9 @@ def progress_bars(store: Store) -> Html:
     """How many tasks of each group have a row."""
     lines = [
         html(
-            '<tr><td>{}</td><td style="width:220px"><div class="emaviz-job-share">'
-            '<i style="width:{:.1f}%"></i></div></td><td>{} of {}{}</td></tr>',
+            '<tr><td>{}</td><td style="width:220px;vertical-align:middle">'
+            '<div class="emaviz-job-share" style="width:200px"><i style="width:{:.1f}%"></i></div></td>'
+            "<td>{} of {}{}</td></tr>",
             group,
             100.0 * one["rows"] / max(one["tasks"], 1),
             one["rows"],

@@ -11,6 +11,7 @@ import viser
 from ema_model.fleet.result import UnitsCompared, document_of, lacking, notes, rests_on, sentences
 from emaviz.figures import fleet
 from emaviz.page.panel import REPORT, FolderChoice, JobLine, KeepButtons, Keeps, PracticeButtons, Seal
+from emaviz.page.share import Place
 from emaviz.page.tab import Shared, Standing, Tab
 from emaviz.page.window_layout import COLUMNS, NEXT_COLUMN, PLOTS_EARLY
 from emaviz.page.workspaces import Page, Workspace
@@ -249,6 +250,17 @@ class UnitsTab(Tab):
     def refresh_files(self) -> None:
         """What may be compared."""
         self.panel.refresh()
+
+    def place(self) -> Place:
+        """The folder of units."""
+        return {"units": [self.comparing.chosen]}
+
+    def go_to(self, place: Place) -> None:
+        """Chooses it."""
+        for name in place.get("units", ())[:1]:
+            if name != self.comparing.chosen:
+                self.comparing.folder.inner(name)
+                self.panel.choose(name)
 
     def kept(self) -> dict[str, Part]:
         """What is chosen, and the answer."""

@@ -71,6 +71,11 @@ def page() -> Html:
         f"div:has(> div > .emaviz-pairs) {_LABEL}{{width:5.6em!important}}"
         f"div:has(> div > .emaviz-pairs) > div:has(input[type=checkbox]) > .mantine-Flex-root > div:first-child"
         "{width:8.4em!important}"
+        # a result's links, in the line of the tabs above it
+        ".emaviz-share{display:flex;gap:16px;justify-content:flex-end;padding:2px 12px;font-size:12.5px;"
+        "line-height:20px}.emaviz-report{padding:6px 12px 0;font-size:14px}"
+        ".emaviz-share a{color:inherit;text-underline-offset:2px}"
+        "@media (min-width:900px){[data-dock-region=right] .emaviz-share{position:fixed;top:20px;right:34px;z-index:5}}"
         "</style>"
     )
     return rules + _strip() + _jobs() + window_layout.style() + charts.style() + measure.style()
@@ -121,6 +126,7 @@ def _jobs() -> Html:
         f"{row} > div:has(> .emaviz-jobs){{display:none}}{row} > div:has(.emaviz-job){{flex:1 1 0;min-width:0}}"
         f"{row} button{{height:19px!important;min-height:0!important;padding:0 8px!important;font-size:12px!important;"
         "width:auto!important}"
+        f"{row} .mantine-Button-section{{margin-inline:0 4px!important}}"
         f"{row} span{{white-space:nowrap}}"
         ".emaviz-job{display:flex;align-items:center;gap:12px;font-size:13px;line-height:20px;white-space:nowrap;"
         "overflow:hidden}.emaviz-job > span{overflow:hidden;text-overflow:ellipsis}"

@@ -34,6 +34,7 @@ from emaviz.page.panel import (
     PracticeButtons,
     Seal,
 )
+from emaviz.page.share import Place
 from emaviz.page.style import LONG_LABELS, unseen_field
 from emaviz.page.tab import Shared, Standing, Tab
 from emaviz.page.window_layout import COLUMNS, NEXT_COLUMN
@@ -233,6 +234,24 @@ class TrackResult:
                 self._fault.value = BY_NAME[_first(last)].label
             if asked:
                 self._kept.clear()
+        self._draw()
+
+    def place(self) -> Place:
+        """What is shown, for an address."""
+        if self._history is None or self._history.last is None:
+            return {}
+        then = [] if self._today.value >= self._today.max else [str(int(self._today.value))]
+        return {"k": [self._faults[str(self._fault.value)]], "today": then}
+
+    def go_to(self, place: Place) -> None:
+        """As `place` gave it; nothing before flights are followed."""
+        if self._history is None or self._history.last is None:
+            return
+        for name in place.get("k", ()):
+            if name in self._faults.values():
+                self._fault.value, self._by_hand = BY_NAME[name].label, True
+        days = [int(one) for one in place.get("today", ()) if one.isdecimal()]
+        self._today.value = min(max([*days, self._today.min] if days else [self._today.max]), self._today.max)
         self._draw()
 
     def _choose(self) -> None:
@@ -489,6 +508,18 @@ class TrackTab(Tab):
     def refresh_files(self) -> None:
         """What may be followed."""
         self.panel.refresh()
+
+    def place(self) -> Place:
+        """The folder of flights, the k that is shown, and today."""
+        return {"flights": [self.following.chosen], **self.result.place()}
+
+    def go_to(self, place: Place) -> None:
+        """Chooses the flights; of those that are followed, shows the k on the day."""
+        for name in place.get("flights", ())[:1]:
+            if name != self.following.chosen:
+                self.following.folder.inner(name)
+                self.panel.choose(name)
+        self.result.go_to(place)
 
     def kept(self) -> dict[str, Part]:
         """The flights, as they were identified."""

@@ -37,7 +37,7 @@ from emaviz.session.jobs import Job, Run, Signal, Steps, Stopped, Tell
 _HEADER = "campaign.json"
 _DEPTHS = ("*", "*/*")  # below the data folder
 _OWN, _PLANS = "campaigns", "plans"  # folders of the data folder: of campaigns that begin here, of plans of one's own
-_REPORT = "report.html"
+REPORT = "report.html"
 _THESIS = ("thesis_quick", "thesis")  # the plans of which a report and a recording are set beside the thesis
 _NAME = re.compile(r"\w[\w.() +-]{0,60}")
 _LOOK_S = 0.1
@@ -80,6 +80,12 @@ class Campaigns:
         if name not in folders:
             raise InputError(f"{shown(name)}: no such campaign; read the folder again")
         return Store(folders[name])
+
+    def report(self, name: str) -> Path | None:
+        """A campaign's report, by its campaign's name and its own, or None; of the data folder alone."""
+        path = self._data.folder / name
+        fits = path.name == REPORT and self._data.holds(path) and (path.parent / _HEADER).is_file()
+        return path if fits and path.is_file() else None
 
     def inputs(self, name: str) -> Inputs:
         """What a campaign's tables are made from now."""
@@ -156,7 +162,7 @@ class Campaigns:
         """The report, in the campaign's folder; beside the thesis also a recording, where the viewer finds it."""
         from emaviz.report import campaign, reproduce  # plotly takes a second to import
 
-        path = store.folder / _REPORT
+        path = store.folder / REPORT
         if not asked.reproduces:
             campaign.write_campaign_report(store, path)
             return [path]

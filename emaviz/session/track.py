@@ -272,6 +272,8 @@ class Following:
         told: list[str] = []
 
         def work(run: Run) -> None:
+            if todo and self.history is None:
+                self.events.began([], len(paths))
             try:
                 for place, path in enumerate(todo):
                     self._take(path, place, len(todo), run)

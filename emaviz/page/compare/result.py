@@ -318,6 +318,7 @@ class ResultPanel:
         self._comparison: Comparison | None = None
         self._time_s = 0.0  # where the clock stood when the plots were drawn last
         self._region: Region | None = None
+        self.wanted: int | None = None  # the place of the region that is chosen once there is a comparison
         self._preview: Any = None
         self._mapped: list[Lines] = []  # what the preview draws
         self._buttons: list[Any] = []
@@ -430,6 +431,15 @@ class ResultPanel:
             self._kept.clear()
         self._put(0)
         self._plots.begin(View(comparison))
+        if self.wanted is not None:
+            self.select(self.wanted)
+            self.wanted = None
+
+    @property
+    def selected(self) -> int | None:
+        """The place of the chosen region in the list; None for none."""
+        regions = self._comparison.worst_regions if self._comparison is not None else []
+        return next((i for i, one in enumerate(regions) if one is self._region), None)
 
     def select(self, index: int) -> None:
         """Highlights a region in every plot, and moves the play-head and the actuator to its worst moment."""

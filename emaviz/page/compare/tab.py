@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -22,6 +22,7 @@ from emaviz.page.compare import WORKSPACE
 from emaviz.page.compare.files import MappingStep, RawLines, health_card, recordings_list
 from emaviz.page.compare.result import ResultPanel
 from emaviz.page.panel import RECORD, REPORT, JobLine, KeepButtons, Lead, Leads
+from emaviz.page.share import Place
 from emaviz.page.style import LONG_LABELS
 from emaviz.page.tab import Shared, Standing, Tab
 from emaviz.page.workspaces import Page
@@ -530,6 +531,35 @@ class CompareTab(Tab):
     def refresh_files(self) -> None:
         """What may be added."""
         self.panel.refresh_files()
+
+    def place(self) -> Place:
+        """The measurements, the actuator where it is not the app's, and the chosen region."""
+        comparing, region = self.shared.comparing, self.result.selected
+        found: dict[str, Sequence[str]] = {"file": list(comparing.opened)}
+        if comparing.actuator_name != comparing.session.actuator.name:
+            found["actuator"] = [comparing.actuator_name]
+        return found if region is None else {**found, "region": [f"{region + 1}"]}
+
+    def go_to(self, place: Place) -> None:
+        """Opens the measurements, which are compared, unless that is done; then chooses the region."""
+        comparing, files = self.shared.comparing, list(place.get("file", ()))
+        region = next((int(one) - 1 for one in place.get("region", ()) if one.isdecimal()), None)
+        name = next(iter(place.get("actuator", ())), comparing.session.actuator.name)
+        for one in files:
+            comparing.folder.measurement(one)  # all of them, before what is open gives way
+        if files and (files != list(comparing.opened) or name != comparing.actuator_name):
+            comparing.choose_actuator(name)
+            self.panel.asked.show_settings()
+            self.result.wanted = region
+            for one in [one for one in comparing.opened if one not in files]:
+                comparing.remove(one)
+            for one in files:
+                comparing.add(one)
+        elif region is not None and comparing.comparison is not None:
+            if region != self.result.selected:
+                self.result.select(region)
+        else:
+            self.result.wanted = region
 
     def kept(self) -> dict[str, Part]:
         """What is opened and asked."""

@@ -67,7 +67,7 @@ class CampaignControls:
             JobLine(page, campaigns.job, at)
             again = gui.add_button("Look for campaigns again", icon=viser.Icon.REFRESH, color="gray")
         with gui.add_folder("Compute a campaign", expand_by_default=False):
-            self._starts = _Starts(page, at, campaigns, files)
+            self.starts = _Starts(page, at, campaigns, files)
         self._provenance = Provenance("the table", again.label, lambda: campaigns.inputs(str(self._choice.value)))
         standing = standings(self._provenance)
         standing.connect(again)
@@ -210,14 +210,15 @@ class _Starts:
     def _asked(self) -> Computing:
         return Computing(self._titles.get(str(self._plan.value), ""), str(self._name.value), int(self._workers.value))
 
+    def refresh(self) -> None:
+        """Plans that came into the data folder since."""
+        self._titles = {_THESIS.get(name, name): name for name in self._campaigns.plans()}
+        if tuple(self._plan.options) != tuple(self._titles):
+            self._plan.options = tuple(self._titles)
+
     def _take_plan(self) -> None:
-        self._plans()
         self._name.value = Path(self._asked.plan).stem
         self._tell_soon()
-
-    def _plans(self) -> None:
-        """Plans that came since."""
-        self._titles = {_THESIS.get(name, name): name for name in self._campaigns.plans()}
 
     def _tell_soon(self) -> None:
         self._files.post("plan", lambda: self._page.checked(self._tell, self._name))

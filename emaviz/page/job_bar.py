@@ -46,7 +46,7 @@ class JobBar:
         self._panel.float(x=0, y=-1, width=480)
         self._stop.on_click(lambda _: self._slow.post("job bar stops", self._ask_to_stop))
         for place, button in enumerate(self._places):
-            button.on_click(lambda _, place=place: self._slow.post("job bar", lambda: self._take_out(place)))
+            button.on_click(lambda _, place=place: self._slow.post("job bar line", lambda: self._take_out(place)))
         self._jobs.changed.connect(self._soon)
 
     def close(self) -> None:

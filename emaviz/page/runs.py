@@ -589,6 +589,10 @@ class RunsTab(Tab):
         """Shows a run in the viewer while it is being written; from any thread."""
         self.shared.files.post("follow", lambda: self.panel.follow(url, name))
 
+    def refresh_files(self) -> None:
+        """Plans that may be computed."""
+        self.campaigns.starts.refresh()
+
     def takes(self) -> dict[str, Callable[[Path], None]]:
         """Sessions."""
         return {SESSION_SUFFIX: self.sessions.uploaded}

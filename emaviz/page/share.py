@@ -6,7 +6,7 @@ import json
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, Protocol
-from urllib.parse import parse_qs, quote, urlencode
+from urllib.parse import parse_qs, quote, unquote
 
 import viser
 
@@ -74,7 +74,7 @@ _SCRIPT = """
 
 def share_line(view: str, place: Place, makes: Sequence[str] = ()) -> Html:
     """Links of a result, at the upper edge of its panel; makes: kinds of files, by suffix, that are made of it."""
-    query = urlencode(place, doseq=True)
+    query = "&".join(f"{name}={_spelled(one)}" for name, values in place.items() for one in values)
     address = f"/?view={view}{'&' if query else ''}{query}"
     links = [html('<a class="emaviz-copy" href="{}" title="The address of what is shown here">Copy link</a>', address)]
     if ".html" in makes:
@@ -89,6 +89,15 @@ def share_line(view: str, place: Place, makes: Sequence[str] = ()) -> Html:
         query,
         joined(links),
     )
+
+
+def _spelled(text: str) -> str:
+    """As an address has it, with ~ in place of %: viser's page decodes its address, whatever stands in it."""
+    return quote(text, safe="/").replace("~", "%7E").replace("%", "~")
+
+
+def _read(text: str) -> str:
+    return unquote(text.replace("~", "%"))
 
 
 def _link(view: str, suffix: str, text: str, hint: str) -> Html:
@@ -131,7 +140,7 @@ class Sharing:
         Inside(server).run(script.replace("BETWEEN", _BETWEEN))
 
     def _open(self, query: str, client: int) -> None:
-        place = parse_qs(query, max_num_fields=50)
+        place = {name: [_read(one) for one in values] for name, values in parse_qs(query, max_num_fields=50).items()}
         tab = self._tabs.get(place.pop("view", [""])[0])
         try:
             if tab is not None:

@@ -323,14 +323,17 @@ class Page:
         try:
             change()
         except InputError as error:
-            if control is None:
-                self.notify("Input refused", str(error))
-            else:
-                self.say_beside(control, str(error))
+            self._refuse(error, control)
             return False
         if control is not None:
             self.say_beside(control, "")
         return True
+
+    def _refuse(self, error: InputError, control: Any) -> None:
+        if control is None:
+            self.notify("Input refused", str(error))
+        else:
+            self.say_beside(control, str(error))
 
     def ask(self, kind: str, asked: Callable[[], Any], control: Any = None) -> None:
         """Does what was asked soon, on the screen's thread; what is refused stands beside the control that asked."""
@@ -353,24 +356,19 @@ class Page:
         title: of what waits, by default the button's label; of: what the button asks for, where that is not always
         the same.
         """
-        started = waits = False
-
-        def tried() -> None:
-            nonlocal started, waits
+        try:
             if not self.session.ready.is_set():
                 self._wait("One moment", "The models are still being compiled.", button)
-            elif not (started := self._begin(begin, button, of)):
+                return False
+            if not self._begin(begin, button, of):
                 self._line_up(begin, button, title, of)
-                waits = True
-
-        if self.checked(tried, button) and waits:
-            running = self.session.worker.jobs.running
-            text = f"in line: begins after {running.job.title if running else 'the run before'}"
-            if button is None:
-                self.notify(title, text, "blue")
-            else:
-                self.say_beside(button, text, calm=True)
-        return started or waits
+                return True
+        except InputError as error:
+            self._refuse(error, button)
+            return False
+        if button is not None:
+            self.say_beside(button, "")
+        return True
 
     def _begin(self, begin: Callable[[], bool], button: Any, of: str) -> bool:
         jobs = self.session.worker.jobs
@@ -388,15 +386,12 @@ class Page:
 
         def begins() -> bool:
             """Whether it has begun, or cannot, which is said."""
-            begun = False
-
-            def tried() -> None:
-                nonlocal begun
-                begun = self._begin(begin, button, of)
-
-            if not self.checked(tried, button):
-                begun = bool(self._in_line.pop(uuid, True))
-            return begun
+            try:
+                return self._begin(begin, button, of)
+            except InputError as error:
+                self._in_line.pop(uuid, None)
+                self._refuse(error, button)
+                return True
 
         def gone() -> None:
             if self._in_line.pop(uuid, None) is not None and button is not None:
@@ -405,6 +400,11 @@ class Page:
         one = Waiting(title or (button.label if button is not None else "Another run"), begins, gone=gone)
         before = self._in_line.get(uuid)
         self._in_line[uuid] = one
+        text = f"in line: begins after {running.job.title if running else 'the run before'}"
+        if button is None:
+            self.notify(one.title, text, "blue")
+        else:
+            self.say_beside(button, text, calm=True)
         jobs.add(one, before)
 
     def _wait(self, title: str, text: str, button: Any) -> None:

@@ -19,7 +19,8 @@ from ema_model.recordings import SIGNALS
 from ema_model.recordings.formats import FORMATS
 from ema_model.text import COLOURS
 from emaviz.page.compare import WORKSPACE
-from emaviz.page.compare.files import MappingStep, RawLines, health_card, recordings_list
+from emaviz.page.compare.columns import MappingStep
+from emaviz.page.compare.files import health_card, recordings_list
 from emaviz.page.compare.result import ResultPanel
 from emaviz.page.panel import RECORD, REPORT, JobLine, KeepButtons, Lead, Leads
 from emaviz.page.share import Place
@@ -364,7 +365,7 @@ class ComparePanel:
             self._which = gui.add_dropdown("Shown", [_NONE], visible=False)
             self._columns = gui.add_button("Columns…", icon=viser.Icon.TABLE, color="gray", visible=False)
             self._remove = gui.add_button("Remove", icon=viser.Icon.X, color="gray", visible=False)
-        self._mapping = MappingStep(page, comparing, result.preview)
+        self._mapping = result.step
         self._start = gui.add_button("Compare", icon=viser.Icon.ARROWS_DIFF)
         self._line = JobLine(page, comparing.job, WORKSPACE)
         self._health_folder = gui.add_folder("Data health", visible=False)
@@ -519,7 +520,7 @@ class CompareTab(Tab):
             self.result = ResultPanel(
                 self.page,
                 shared.strip,
-                lambda: RawLines(self.page, shared.comparing),
+                lambda preview: MappingStep(self.page, shared.comparing, preview),
                 lambda: leads(self.page, shared.discovering),
                 lambda: KeepControls(self.page, shared.comparing, shared.viewer),
             )

@@ -184,7 +184,7 @@ class App:
         kinds = tabs()
         panels = [self.workspaces.add(one.workspace) for one in kinds]
         self.scene = ActuatorScene(self.server, round(actuator.motor.pole_pairs))
-        self.strip = PlaybackStrip(self.page, self.scene, actuator, self._theme)
+        self.strip = PlaybackStrip(self.page, self.scene, actuator, self._theme, self.sharing.connect)
         self.playback = self.strip.playback
         self.job_bar = JobBar(self.page, self._slow_screen)
         self.shared = Shared(
@@ -202,7 +202,7 @@ class App:
         )
         for kind, panel in zip(kinds, panels):
             self.shared.tabs[kind] = kind(self.shared, panel)
-        self.sharing.connect({kind.workspace.name: one for kind, one in self.shared.tabs.items()})
+        self.sharing.tabs = {kind.workspace.name: one for kind, one in self.shared.tabs.items()}
         self._docked.dock()
         group = gui.add_tab_group()
         for kind, one in self.shared.tabs.items():

@@ -8,10 +8,11 @@ from typing import Any
 
 import viser
 
+from ema_model.quantities.titles import in_sentence
 from ema_model.text import COLOURS
 from emaviz.page.style import JOBS
 from emaviz.page.workspaces import Page
-from emaviz.session.jobs import AtWork, Job, Waiting, Worker
+from emaviz.session.jobs import AtWork, Ended, Job, Waiting, Worker
 from emaviz.text.html import Html, add_html, html, joined
 from emaviz.text.results import begun
 from emaviz.text.time_left import going_on
@@ -26,7 +27,7 @@ class JobBar:
 
     def __init__(self, page: Page, slow: Worker) -> None:
         self._page, self._slow, self._jobs = page, slow, page.session.worker.jobs
-        self._told_end: tuple[Job, str] | None = None  # the last end that was told
+        self._told_end: Ended | None = None  # the last end that was told
         self._seen: Job | None = None  # the run that goes on, once it was shown
         self._stopping: Job | None = None
         self._ends_at: threading.Timer | None = None
@@ -37,7 +38,7 @@ class JobBar:
         with self._panel.add_tab("Jobs", viser.Icon.PLAYER_PLAY):
             add_html(gui, JOBS)
             self._told = add_html(gui)
-            self._stop: Any = gui.add_button("Stop", icon=viser.Icon.PLAYER_STOP, color="red")
+            self._stop: Any = gui.add_button("Stop this run", icon=viser.Icon.PLAYER_STOP, color="red")
             self._then = add_html(gui)
             self._places: list[Any] = [
                 gui.add_button("–", icon=viser.Icon.X, color="gray", visible=False, hint="Takes it out of the line")
@@ -95,13 +96,14 @@ class JobBar:
         if ended is None or ended is self._told_end:
             return
         self._told_end = ended
-        job, text = ended
-        if job is not seen or not text:
+        if ended.job is not seen:
             return
         self._ending = True
-        good = job.finished and not job.error
+        how = "Failed" if ended.job.error else "Stopped" if ended.stopped else "Done"
+        good = how == "Done"
         sign = html('<span style="color:{}">{}</span>', COLOURS["good" if good else "warning"], "✓" if good else "▲")
-        self._told.content = _line(sign, html("<b>{}</b>", begun(self._page.local(text))), self._way(job, "Show"))
+        said = html("<b>{}: {}</b>", how, in_sentence(ended.title))
+        self._told.content = _line(sign, said, self._way(ended.job, "Show"))
         self.close()
         self._ends_at = threading.Timer(_TOLD_S, self._forget_end)
         self._ends_at.daemon = True

@@ -118,13 +118,12 @@ class Sharing:
 
     def __init__(self, page: Page, viewer: ViewerHost | None) -> None:
         self._page, self._viewer = page, viewer
-        self._tabs: Mapping[str, Opens] = {}
+        self.tabs: Mapping[str, Opens] = {}  # by the workspace's name, once the page is built
         self.results: dict[str, Provenance] = {}  # by the workspace's name
         self.files: Callable[[str], Path | None] = lambda name: None  # others that may be asked for, by their name
 
-    def connect(self, tabs: Mapping[str, Opens]) -> None:
-        """Begins to follow windows; to be called where an unseen field may stand.  tabs: by the workspace's name."""
-        self._tabs = tabs
+    def connect(self) -> None:
+        """Begins to follow windows; to be called where an unseen field may stand."""
         server = self._page.server
         field: Any = server.gui.add_text("Address opened", "")
         add_html(server.gui, unseen_field(id_of(field)))
@@ -141,7 +140,7 @@ class Sharing:
 
     def _open(self, query: str, client: int) -> None:
         place = {name: [_read(one) for one in values] for name, values in parse_qs(query, max_num_fields=50).items()}
-        tab = self._tabs.get(place.pop("view", [""])[0])
+        tab = self.tabs.get(place.pop("view", [""])[0])
         try:
             if tab is not None:
                 tab.go_to(place)

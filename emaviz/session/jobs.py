@@ -235,6 +235,15 @@ class AtWork:
     share: float | None  # that is done, if that is known
 
 
+@dataclass(frozen=True)
+class Ended:
+    """A run that is over."""
+
+    job: Job
+    title: str
+    stopped: bool  # by a person
+
+
 class Jobs:
     """Of one compute thread.  `changed` is called on the threads that work, so that listeners only hand over."""
 
@@ -242,7 +251,7 @@ class Jobs:
         self.changed: Signal[[]] = Signal()
         self.running: AtWork | None = None
         self.begun = 0  # runs so far
-        self.ended: tuple[Job, str] | None = None  # the run before, and what came of it
+        self.ended: Ended | None = None  # the run before
         self._worker = worker
         self._waiting: list[Waiting] = []
         self._lock = threading.RLock()
@@ -288,9 +297,9 @@ class Jobs:
         self.running = AtWork(job, text, elapsed_s, share)
         self.changed()
 
-    def over(self, job: Job, text: str) -> None:
-        """It has ended, with what came of it."""
-        self.running, self.ended = None, (job, text)
+    def over(self, ended: Ended) -> None:
+        """It runs no more."""
+        self.running, self.ended = None, ended
         self.changed()
 
     def _look_on(self) -> None:
@@ -583,10 +592,12 @@ class Job:
         self._end("")
 
     def _end(self, text: str, done: Callable[[], str | None] | None = None) -> None:
+        run = self._run
+
         def ended() -> None:
             self.running = False
-            said = (done() if done is not None else None) or text
-            self._worker.jobs.over(self, said or self.error)
-            self.ended(said)
+            if run is not None:
+                self._worker.jobs.over(Ended(self, run.title, run.stopping))
+            self.ended((done() if done is not None else None) or text)
 
         self._worker.post(f"end of {id(self)}", ended)

@@ -207,8 +207,7 @@ def test_runs_that_wait_begin_in_their_order_one_after_another(worker):
     wait_until(lambda: len(order) == 2)
     assert order == ["another", "fourth"] and not jobs.waiting
     wait_until(lambda: jobs.running is None)
-    job, text = jobs.ended
-    assert job is own["fourth"] and text.startswith("fourth: done in ")
+    assert jobs.ended is not None and (jobs.ended.job, jobs.ended.stopped) == (own["fourth"], False)
 
 
 def test_one_that_cannot_begin_waits_no_more_and_lets_the_next_go(worker, errors):

@@ -59,9 +59,9 @@ def test_what_runs_is_told_on_every_tab_and_what_comes_waits_in_line(page, app, 
 
     let_go.release(5)
     wait_until(lambda: app.tab(TrackTab).following.last is not None, 20.0)  # eight are enough to look
-    box.get_by_role("button", name="Stop").click()
+    box.get_by_role("button", name="Stop this run").click()
     let_go.release(20)
-    box.get_by_text("Stopped after").wait_for()
+    box.get_by_text("Stopped: identifying flights").wait_for()
     box.get_by_text("Show").click()
     page.wait_for_function("location.search.includes('view=track')")
     page.get_by_text("After flight_0").first.wait_for()

@@ -80,7 +80,7 @@ def share_line(view: str, place: Place, makes: Sequence[str] = ()) -> Html:
     if ".html" in makes:
         links.append(_link(view, ".html", "Report ↗", "Opens as a page of its own, which needs nothing beside it"))
     if VIEW in makes:
-        links.append(_link(view, VIEW, "In Rerun ↗", "Opens the recording in the Rerun viewer"))
+        links.append(_link(view, VIEW, "Rerun ↗", "Opens the recording in the Rerun viewer"))
     if ".rrd" in makes:
         links.append(_link(view, ".rrd", ".rrd ↓", "Saves the recording for the Rerun viewer"))
     return html(

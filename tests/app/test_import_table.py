@@ -66,12 +66,12 @@ def test_columns_are_drawn_edited_and_used_in_one_table(page, app):
     assert top < 300.0 and bottom < 900.0 - 68.0, "all of it in sight"
 
     page.get_by_label("What channel_7 is").select_option("load_torque_Nm")
-    page.get_by_label("Unit of channel_7 in the file").select_option("mN·m")
+    page.get_by_label("Unit of channel_7 in the file").select_option("mNm")
     step = app.tab(CompareTab).result.step
     wait_until(lambda: step.mapping.get("load_torque_Nm") is not None and step.mapping.get("load_torque_Nm").unit)
     assert step.mapping.get("load_torque_Nm").converter.to_si(1e3) == pytest.approx(1.0)
     page.get_by_title("Draws channel_7 below").click()
-    wait_until(lambda: "<b>channel_7, as it stands in the file</b> [mN·m]" in page.evaluate(AXES))
+    wait_until(lambda: "<b>channel_7, as it stands in the file</b> [mNm]" in page.evaluate(AXES))
     late = page.get_by_label("channel_7 is late by, ms")
     late.fill("2")
     late.press("Enter")

@@ -268,6 +268,8 @@ def label(row: Mapping[str, Any], number: int) -> str:
     elif "error_wrapped_percent" in row:
         error = row["error_wrapped_percent"]
         told = f"rmse {row['rmse_A']:.3f} A" if error is None else f"Err {error:.2f} %"
+    elif "adequate" not in row:  # what it found is in the tables
+        told = ""
     else:
         told = "adequate" if row["adequate"] else str(row["variable"] or "not adequate")
     return " · ".join(filter(None, (f"{number}", told, row["case"], f"seed {row['seed']}")))

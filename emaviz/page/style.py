@@ -117,7 +117,7 @@ def _jobs() -> Html:
     return unescaped(
         f"<style>{panel}{{position:fixed!important;left:0!important;right:0!important;top:auto!important;"
         f"bottom:0!important;width:100%!important;height:{_JOBS_HEIGHT_PX}px!important;transform:none!important;"
-        "border-radius:0!important;box-shadow:none!important;z-index:11!important;overflow:hidden!important;"
+        "border-radius:0!important;box-shadow:none!important;z-index:90!important;overflow:hidden!important;"
         "border-top:2px solid var(--mantine-primary-color-filled,#2f6fde)}"
         + ",".join(f"{panel} [data-dock-{handle}]" for handle in handles)
         + "{display:none!important}"
@@ -126,7 +126,7 @@ def _jobs() -> Html:
         f"{row} > div:has(> .emaviz-jobs){{display:none}}{row} > div:has(.emaviz-job){{flex:1 1 0;min-width:0}}"
         f"{row} button{{height:19px!important;min-height:0!important;padding:0 8px!important;font-size:12px!important;"
         "width:auto!important}"
-        f"{row} .mantine-Button-section{{margin-inline:0 4px!important}}"
+        f"{row} .mantine-Button-section{{margin-inline:0 6px!important}}"
         f"{row} span{{white-space:nowrap}}"
         ".emaviz-job{display:flex;align-items:center;gap:12px;font-size:13px;line-height:20px;white-space:nowrap;"
         "overflow:hidden}.emaviz-job > span{overflow:hidden;text-overflow:ellipsis}"
@@ -147,7 +147,8 @@ def unseen(controls: Sequence[str]) -> Html:
 
 def unseen_field(field: str) -> Html:
     """The same for a field of text, which its label alone names by its id."""
-    return unescaped(f"<style>.mantine-Flex-root:has(label[for='{field}']){{display:none!important}}</style>")
+    row = f".mantine-Flex-root:has(label[for='{field}'])"
+    return unescaped(f"<style>{row},div:has(> {row}){{display:none!important}}</style>")
 
 
 def caption(text: str) -> Html:

@@ -19,6 +19,7 @@ from ema_model.recordings.column_mapping import WITHOUT_DELAY, unit_in_name
 from ema_model.text import COLOURS
 from emaviz.page.compare.files import LayoutControls, RawLines
 from emaviz.page.style import unseen_field
+from emaviz.page.window_layout import TWO_COLUMNS_PX
 from emaviz.page.workspaces import Page
 from emaviz.server.viser_private import Inside, id_of
 from emaviz.session.compare import Comparing
@@ -60,7 +61,7 @@ _SCRIPT = """
   document.addEventListener('click', act, on);
 })();
 """
-_STYLE = Html(
+_STYLE = unescaped(
     "<style>.emaviz-map{width:100%;border-collapse:collapse;font-size:12.5px;line-height:1.3}"
     ".emaviz-map th{text-align:left;font-weight:400;opacity:.65;padding:2px 8px}"
     ".emaviz-map td{padding:3px 8px;border-top:1px solid rgba(134,142,150,.3);overflow-wrap:anywhere}"
@@ -71,6 +72,8 @@ _STYLE = Html(
     ".emaviz-map button{font:inherit;color:inherit;background:none;border:1px solid rgba(134,142,150,.6);"
     "border-radius:4px;height:26px;min-width:32px;cursor:pointer}"
     ".emaviz-map [data-do=plot]{padding:0;border:0;height:34px;width:220px;text-align:left;color:#2f6fde}"
+    f"@media(max-width:{TWO_COLUMNS_PX - 1}px){{.emaviz-map .why{{display:none}}"
+    ".emaviz-map [data-do=plot]{width:120px}.emaviz-map :is(td,th){padding-left:5px;padding-right:5px}}"
     ".emaviz-map .drawn [data-do=plot]{outline:2px solid #2f6fde;outline-offset:2px}"
     ".emaviz-map svg{display:block}.emaviz-map small{opacity:.75;white-space:nowrap}</style>"
 )
@@ -157,7 +160,7 @@ def _row(place: int, name: str, drawing: Html, entry: MappedColumn | None, why: 
         html('<button data-do="plot" title="Draws {} below">{}</button>', name, drawing),
         _select("signal", _quantities(), "" if entry is None else entry.signal, f"What {name} is"),
         *fields,
-        html('<span style="opacity:.8">{}</span>', why) if entry is None else _sure(entry),
+        html('<span class="why" style="opacity:.8">{}</span>', why) if entry is None else _sure(entry),
     )
 
 
@@ -196,7 +199,8 @@ def _sure(entry: MappedColumn) -> Html:
     good, bad = entry.confidence >= _SURE, entry.confidence < _UNSURE
     colour = COLOURS["good"] if good else COLOURS["warning"] if bad else "inherit"
     share = f"{100.0 * entry.confidence:.0f} %"
-    return html('<b style="color:{}">{}</b> <span style="opacity:.8">{}</span>', colour, share, entry.reason)
+    said = '<b style="color:{}" title="{}">{}</b> <span class="why" style="opacity:.8">{}</span>'
+    return html(said, colour, entry.reason, share, entry.reason)
 
 
 def done(entry: MappedColumn) -> str:
@@ -220,10 +224,12 @@ def drawing(values: Array) -> Html:
         for y in dict.fromkeys((float(part.min()), float(part.max()))) if len(part) else ():
             height = 0.5 if high == low else (y - low) / (high - low)
             points.append(f"{x:.0f},{1 + (1.0 - height) * (_HIGH_PX - 14):.1f}")
-    line = f'<polyline points="{" ".join(points)}" fill="none" stroke="currentColor" stroke-width="1"/>'
+    look = 'fill="none" stroke="currentColor" stroke-width="1" vector-effect="non-scaling-stroke"'
+    line = f'<polyline points="{" ".join(points)}" {look}/>'
     missing = "" if good.all() else f", {100.0 * float(np.mean(~good)):.3g} % missing"
     text = f"{low:.4g} … {high:.4g}{missing}".replace("-", "−") if high > low else f"always {low:.4g}{missing}"
-    svg = f'<svg width="{_WIDE_PX}" height="{_HIGH_PX - 12}" aria-hidden="true">{line}</svg>'
+    size = f'width="100%" height="{_HIGH_PX - 12}" viewBox="0 0 {_WIDE_PX} {_HIGH_PX - 12}" preserveAspectRatio="none"'
+    svg = f'<svg {size} aria-hidden="true">{line}</svg>'
     return unescaped(svg) + html("<small>{}</small>", text)
 
 

@@ -50,8 +50,10 @@ def run_plan(
     """Computes what the folder lacks, and writes its tables; each row is kept as it comes.
 
     However it is ended, the next run goes on from the rows that are there.  retry: what ended in an error is
-    computed again.  Raises InputError for a folder that is not this plan's, for workers that cannot be reached, and
-    for a disk that takes no more; what is there is kept.
+    computed again.  on_progress: called with new rows, and twice a second meanwhile; what it raises ends the run.
+
+    Raises InputError for a folder that is not this plan's, for workers that cannot be reached, and for a disk that
+    takes no more; what is there is kept.
     """
     store = Store.writing(folder, header_of(plan.title, plan.about, plan.tasks), plan.text, plan.tasks)
     try:

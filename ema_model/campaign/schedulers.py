@@ -103,8 +103,7 @@ class Processes:
                             found.append((task, Died(f"Died: {MOST_DEATHS} workers ended while they computed it")))
                     if waiting:
                         running.append(_Process(version))
-                if found:
-                    yield found
+                yield found
         finally:
             for one in running:
                 one.kill()

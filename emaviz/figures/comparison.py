@@ -19,7 +19,7 @@ from ema_model.quantities.axes import of_residual as residual_of_signal
 from ema_model.quantities.numbers import Quantity
 from ema_model.quantities.variables import MODULATORS, variable_title
 from ema_model.recordings import SIGNALS, ColumnMapping, Measurement, apply_mapping
-from emaviz.colours import BACKWARD, COMMAND, DIFFERENCE, FORWARD, MONITOR, REFERENCE
+from emaviz.colours import BACKWARD, COMMAND, DIFFERENCE, FORWARD, MONITOR, REFERENCE, SLATE
 from emaviz.figures import theme
 from emaviz.figures.lines import Line, Lines, Window
 from emaviz.figures.lines import within as inside
@@ -599,6 +599,18 @@ def mapped_lines(columns: dict[str, np.ndarray], mapping: ColumnMapping) -> list
         line = Line(signal.title, colour, x, values)
         found.append(Lines(signal.title, signal.unit or "", [line], time="Sample" if time is None else "Time [s]"))
     return found
+
+
+def raw_column(columns: dict[str, np.ndarray], mapping: ColumnMapping, name: str) -> Lines:
+    """A column as it stands in the file, in its unit there, against time or, where that is not known, its samples."""
+    time = next((one for one in mapping.entries if one.signal == "time_s"), None)
+    entry = next((one for one in mapping.entries if one.column == name), None)
+    unit = "unit not said" if entry is None else entry.unit or SIGNALS[entry.signal].unit or ""
+    values = np.asarray(columns[name], dtype=float)
+    known = time is not None and time.column in columns and time.column != name
+    x = time.values(columns[time.column]) if time is not None and known else np.arange(float(len(values)))
+    title = f"{theme.plain(name)}, as it stands in the file"
+    return Lines(title, unit, [Line(title, SLATE, x, values)], time="Time [s]" if known else "Sample")
 
 
 def mapped_columns(every: Sequence[Lines], window_s: Window | None = None) -> tuple[go.Figure, float]:

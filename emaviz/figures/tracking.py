@@ -2,17 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 import plotly.graph_objects as go
 
-from ema_model.faults import BY_NAME
+from ema_model.estimation.problem import to_k
+from ema_model.faults import BY_NAME, NAMES
 from ema_model.quantities.numbers import HALF_90
+from ema_model.tracking.evidence import LEAST_FLIGHTS
+from ema_model.tracking.flights import Flight
 from ema_model.tracking.history import History
 from ema_model.tracking.remaining import Remaining
 from ema_model.tracking.result import FaultTrack, Tracked
-from emaviz.colours import COMMAND, MONITOR, REFERENCE
+from ema_model.tracking.track import TRACKED
+from emaviz.colours import CASES, COMMAND, MONITOR, REFERENCE
 from emaviz.figures import theme
 
 # --- one k over the flights of a unit, with its band, its jumps, and the fan to its threshold -------------------------
@@ -91,6 +95,20 @@ def k_over_flights(
         middle = {"color": MONITOR, "width": 1.5, "dash": "dash"}
         x, y = [now, now + left.p50], [one.level, end]
         chart.add_trace(go.Scatter(x=x, y=y, mode="lines", line=middle, name="forecast"))
+    return chart
+
+
+def k_so_far(flights: Sequence[Flight], count: int, *, dark: bool = False) -> go.Figure:
+    """Each k of the first flights, too few for a trend, as identified; count: flights in all."""
+    chart = theme.new("k of each flight so far", "Flight", "k [-]", dark=dark)
+    at = [i for i, one in enumerate(flights, 1) if not one.excluded]
+    k = to_k(np.array([one.k for one in flights if not one.excluded]).reshape(-1, len(NAMES)))
+    for i, name in enumerate(TRACKED):
+        line = {"color": CASES[i % len(CASES)], "width": 1.5, "dash": "dot" if i >= len(CASES) else "solid"}
+        y, style = k[:, NAMES.index(name)], {"mode": "lines+markers", "marker": {"size": 5}, "line": line}
+        chart.add_trace(go.Scatter(x=at, y=y, name=BY_NAME[name].label, **style))
+    chart.update_xaxes(range=[0.5, max(count, LEAST_FLIGHTS) + 0.5])
+    chart.update_yaxes(range=[-0.05, 1.05])
     return chart
 
 

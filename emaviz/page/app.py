@@ -20,9 +20,11 @@ from ema_model.simulation import plant
 from emaviz.page import compare, explore
 from emaviz.page.charts import add_chart_tools
 from emaviz.page.explore.tab import ExploreTab
+from emaviz.page.job_bar import JobBar
 from emaviz.page.measure import Measuring, add_measuring
 from emaviz.page.panel import follow_theme
 from emaviz.page.playback import PlaybackStrip
+from emaviz.page.share import Sharing
 from emaviz.page.tab import AnyTab, Shared, Standings, Tab
 from emaviz.page.window_layout import LEFT_PX, Docked
 from emaviz.page.workspaces import Page, Workspace, Workspaces
@@ -139,6 +141,7 @@ class App:
             lambda: self.viewer.address if self.viewer else None,
             data.scene,
             self.measuring.answer,
+            lambda *asked: self.sharing.answer(*asked),
         )
         self.viewer, no_viewer = _viewer(recordings)
         self.session = Session(actuator, recordings)
@@ -150,10 +153,12 @@ class App:
         self.workspaces = Workspaces(self.server, self.screen, self._docked, first.name)
         self.page = Page(self.server, self.session, self.screen, self.workspaces, self.measuring, data.folder)
         self.standings = Standings(self.screen, self.workspaces)
+        self.sharing = Sharing(self.page, self.viewer)
         self.comparing = Comparing(self.session, data)
         self.session.open_file, self.session.version_of = self.comparing.measurement, self.comparing.version
         self.discovering = Discovering(self.session, self.comparing)
         self.campaigns = Campaigns(self.session, data, campaigns)
+        self.sharing.files = self.campaigns.report
         self._build()
         self._first = threading.Event()
         self.first_picture_s = 0.0
@@ -179,8 +184,9 @@ class App:
         kinds = tabs()
         panels = [self.workspaces.add(one.workspace) for one in kinds]
         self.scene = ActuatorScene(self.server, round(actuator.motor.pole_pairs))
-        self.strip = PlaybackStrip(self.page, self.scene, actuator, self._theme)
+        self.strip = PlaybackStrip(self.page, self.scene, actuator, self._theme, self.sharing.connect)
         self.playback = self.strip.playback
+        self.job_bar = JobBar(self.page, self._slow_screen)
         self.shared = Shared(
             self.page,
             self.strip,
@@ -192,9 +198,11 @@ class App:
             self._slow_screen,
             self._files,
             self.standings,
+            self.sharing,
         )
         for kind, panel in zip(kinds, panels):
             self.shared.tabs[kind] = kind(self.shared, panel)
+        self.sharing.tabs = {kind.workspace.name: one for kind, one in self.shared.tabs.items()}
         self._docked.dock()
         group = gui.add_tab_group()
         for kind, one in self.shared.tabs.items():
@@ -224,6 +232,7 @@ class App:
     def close(self) -> None:
         """Ends everything that was started."""
         self.playback.close()
+        self.job_bar.close()
         self.standings.close()
         for one in self.shared.tabs.values():
             one.close()

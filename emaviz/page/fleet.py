@@ -11,6 +11,7 @@ import viser
 from ema_model.fleet.result import UnitsCompared, document_of, lacking, notes, rests_on, sentences
 from emaviz.figures import fleet
 from emaviz.page.panel import REPORT, FolderChoice, JobLine, KeepButtons, Keeps, PracticeButtons, Seal
+from emaviz.page.share import Place
 from emaviz.page.tab import Shared, Standing, Tab
 from emaviz.page.window_layout import COLUMNS, NEXT_COLUMN, PLOTS_EARLY
 from emaviz.page.workspaces import Page, Workspace
@@ -148,7 +149,7 @@ class UnitsPanel:
         )
         self._actuator: Any = gui.add_dropdown("Actuator", (comparing.actuator_name,), hint="The units' type")
         self._start = gui.add_button("Compare units", icon=WORKSPACE.icon, disabled=True)
-        self._line = JobLine(page, comparing.job, pauses="it")
+        self._line = JobLine(page, comparing.job, WORKSPACE, pauses="it")
         self._rule.on_update(lambda event: event.client and post("units rule", self._take_rule))
         self._actuator.on_update(lambda event: event.client and post("units actuator", self._take_actuator))
         self._start.on_click(lambda _: post("compare units", self._begin))
@@ -249,6 +250,17 @@ class UnitsTab(Tab):
     def refresh_files(self) -> None:
         """What may be compared."""
         self.panel.refresh()
+
+    def place(self) -> Place:
+        """The folder of units."""
+        return {"units": [self.comparing.chosen]}
+
+    def go_to(self, place: Place) -> None:
+        """Chooses it."""
+        for name in place.get("units", ())[:1]:
+            if name != self.comparing.chosen:
+                self.comparing.folder.inner(name)
+                self.panel.choose(name)
 
     def kept(self) -> dict[str, Part]:
         """What is chosen, and the answer."""

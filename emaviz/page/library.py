@@ -151,7 +151,7 @@ class LibraryPanel:
             icon=viser.Icon.PHOTO,
             hint="Each where it shows most; the first time, the library is compiled, which takes some seconds",
         )
-        JobLine(page, library.job)
+        JobLine(page, library.job, WORKSPACE)
         self._style = add_html(gui)
         self._cards = {name: self._card(effect) for name, effect in CATALOGUE.items()}
         self._none = add_html(gui, note("No effect of the library has this."), visible=False)

@@ -11,12 +11,12 @@ import viser
 
 from ema_model.text import InWords
 from emaviz.page.style import IN_ROW
-from emaviz.page.workspaces import Page
+from emaviz.page.workspaces import Page, Workspace
 from emaviz.recording.viewer import ViewerHost
 from emaviz.server.viser_private import Inside
 from emaviz.session.data_folder import DataFolder
 from emaviz.session.files import Practice
-from emaviz.session.inputs import Provenance
+from emaviz.session.inputs import Provenance, ResultFiles
 from emaviz.session.jobs import Job, Signal
 from emaviz.text.html import BOX, Html, add_html, boxed, html, joined
 from emaviz.text.results import begun, large, warned
@@ -69,8 +69,12 @@ def recording_link(viewer: ViewerHost | None, path: Path, text: str = "") -> Htm
 class JobLine:
     """A line of text; while the job runs, a bar, what goes on, and how long it still takes where that is known."""
 
-    def __init__(self, page: Page, job: Job, *, stop: str = "Stop", pauses: str = "") -> None:
-        """stop: the button's label; pauses: what its other button pauses, as in 'the search', or none."""
+    def __init__(self, page: Page, job: Job, at: Workspace, *, stop: str = "Stop", pauses: str = "") -> None:
+        """at: to which the job bar leads; stop: the button's label.
+
+        pauses: what its other button pauses, as in 'the search', or none.
+        """
+        page.job_tabs[job] = at.name
         self._page, self._job, self._pauses = page, job, pauses
         self._title = self._waited = ""
         self._stopping = False
@@ -282,6 +286,8 @@ class KeepButtons:
         provenance: of the result, which is written as it was computed.
         """
         self._provenance = provenance
+        makes = [one.suffix for one in buttons if one in (REPORT, RECORD)]
+        self._files = provenance.files = ResultFiles(makes, lambda: provenance.of, lambda suffix: save(suffix, None))
         self._folder, self._viewer, self._save = folder, viewer, save
         self._asked: viser.ClientHandle | None = None  # who is sent the file
         self._gui = gui = page.server.gui
@@ -298,6 +304,7 @@ class KeepButtons:
 
     def clear(self) -> None:
         """Something else is shown: what was kept before is told no more."""
+        self._files.clear()
         self._links.content = ""
 
     def name(self, path: Path, text: str = "") -> None:
@@ -316,6 +323,8 @@ class KeepButtons:
         self._save(suffix, button)
 
     def _kept(self, path: Path) -> None:
+        if self._files.came(path):
+            return
         if path.suffix == RECORD.suffix:
             self._links.content = recording_link(self._viewer, path)
             return

@@ -43,7 +43,15 @@ class PlaybackStrip:
     of the recording's own time, on the screen's thread.
     """
 
-    def __init__(self, page: Page, scene: ActuatorScene, actuator: Actuator, theme: Callable[[bool], None]) -> None:
+    def __init__(
+        self,
+        page: Page,
+        scene: ActuatorScene,
+        actuator: Actuator,
+        theme: Callable[[bool], None],
+        unseen: Callable[[], object] = lambda: None,
+    ) -> None:
+        """unseen(): adds what scripts press and fill, where nobody sees it."""
         self._page, self._scene, self._theme = page, scene, theme
         self._span_s = (0.0, 0.5)
         self._placed: set[int] = set()  # windows with an actuator of their own
@@ -70,6 +78,7 @@ class PlaybackStrip:
             self._figures = add_html(gui)
             self._caption = add_html(gui)
             page.workspaces.connect()
+            unseen()
         self._panel.float(x=0, y=-1, width=480)
         self._play.on_click(self._pressed)
         self._speed.on_update(lambda _: self._set_speed())

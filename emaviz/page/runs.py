@@ -6,6 +6,7 @@ import threading
 import time
 from collections.abc import Callable, Iterable, Mapping
 from datetime import datetime
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -21,6 +22,7 @@ from emaviz.figures.lines import Lines, Window, clipped
 from emaviz.page.campaigns import CampaignControls
 from emaviz.page.measure import marked
 from emaviz.page.panel import recording_link
+from emaviz.page.share import Place, share_line
 from emaviz.page.tab import Shared, Tab
 from emaviz.page.window_layout import COLUMNS
 from emaviz.page.workspaces import Page, Workspace
@@ -178,7 +180,7 @@ class RunsResult:
         """The viewer with a recording, in the page, as light or dark as that is."""
         self._opened = url, name
         url += f"&theme={'dark' if self._dark else 'light'}"
-        self._frame.content = html(
+        self._frame.content = share_line(WORKSPACE.name, {"run": [name]}) + html(
             '<div style="padding:0 10px 4px;font-size:12px;overflow-wrap:anywhere"><b>{}</b> · '
             '<a href="{}" target="_blank" rel="noopener">in a tab of its own ↗</a></div>'
             '<iframe class="emaviz-rerun" src="{}" title="Rerun viewer" '
@@ -341,6 +343,10 @@ class RunsPanel:
         self.refresh()
         self._open_chosen()
 
+    def check(self, name: str) -> None:
+        """InputError where there is no such recording."""
+        self._recorded.path(name)
+
     def follow(self, url: str, name: str) -> None:
         """Shows a run while it is being written; the list has it from now on."""
         self._growing, self._by_hand = name, True
@@ -414,7 +420,10 @@ class RunsPanel:
         if (entry.name, entry.at) == self._seen or not self._page.workspaces.anyone(WORKSPACE.name):
             return
         self._seen = entry.name, entry.at
-        told = html('<div style="padding:8px 10px 2px;font-size:14px"><b>{}</b></div>{}', entry.name, _card(entry))
+        links = share_line(WORKSPACE.name, {"run": [entry.name]})
+        told = links + html(
+            '<div style="padding:8px 10px 2px;font-size:14px"><b>{}</b></div>{}', entry.name, _card(entry)
+        )
         try:
             self._result.show(told, self._recorded.read(entry.name))
         except InputError:  # it is not whole
@@ -552,8 +561,9 @@ class RunsTab(Tab):
         recorded = RecordedRuns(shared.comparing.folder.recordings)
         self.panel = RunsPanel(page, shared.viewer, recorded, shared.files, self.result)
         self.sessions = SessionControls(page, shared.comparing, shared.files, shared.kept, shared.standings.lines)
-        CampaignControls(
+        self.campaigns = CampaignControls(
             page,
+            WORKSPACE,
             shared.campaigns,
             shared.files,
             self.right,
@@ -563,9 +573,25 @@ class RunsTab(Tab):
         for events in (shared.comparing.events, shared.discovering.events):
             events.kept.connect(lambda _: self.panel.refresh_soon())
 
+    def place(self) -> Place:
+        """The campaign."""
+        return self.campaigns.place()
+
+    def go_to(self, place: Place) -> None:
+        """A recording, in the viewer, or a campaign."""
+        for run in place.get("run", ())[:1]:
+            self.panel.check(run)
+            self.shared.files.post("address", partial(self.panel.choose, run))
+        for name in place.get("campaign", ())[:1]:
+            self.campaigns.choose(name)
+
     def follow(self, url: str, name: str) -> None:
         """Shows a run in the viewer while it is being written; from any thread."""
         self.shared.files.post("follow", lambda: self.panel.follow(url, name))
+
+    def refresh_files(self) -> None:
+        """Plans that may be computed."""
+        self.campaigns.starts.refresh()
 
     def takes(self) -> dict[str, Callable[[Path], None]]:
         """Sessions."""

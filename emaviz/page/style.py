@@ -13,6 +13,7 @@ from emaviz.figures.theme import DARK, LIGHT
 from emaviz.page import charts, measure, window_layout
 from emaviz.text.html import Html, html, unescaped
 
+JOBS = Html('<div class="emaviz-jobs"></div>')  # stands in the panel that becomes the job bar
 STRIP = Html('<div class="emaviz-strip"></div>')  # stands in the panel that becomes the strip
 TIME_CHARTS = Html('<div class="emaviz-time"></div>')  # stands beside charts over time
 LONG_LABELS = Html('<div class="emaviz-long"></div>')  # stands beside controls with long labels
@@ -21,6 +22,7 @@ IN_ROW = Html('<div class="emaviz-row"></div>')  # stands before buttons that sh
 # stands before the upload button that takes dropped files, which is not to be seen
 WIDE_MODAL = Html("<style>.mantine-Modal-root{--modal-size:min(960px,92vw)!important}</style>")
 STRIP_HEIGHT_PX = 68
+_JOBS_HEIGHT_PX = 25  # of the strip, whose small print gives way
 _HELD_OUT_ON_DARK, _LIMIT_ON_DARK = "#d17ee3", "#f06595"  # of numbers and notes, which are thin
 _ROW_PX = 48
 _BUTTON_PX = 90  # that a button in a row needs at least
@@ -69,9 +71,14 @@ def page() -> Html:
         f"div:has(> div > .emaviz-pairs) {_LABEL}{{width:5.6em!important}}"
         f"div:has(> div > .emaviz-pairs) > div:has(input[type=checkbox]) > .mantine-Flex-root > div:first-child"
         "{width:8.4em!important}"
+        # a result's links, in the line of the tabs above it
+        ".emaviz-share{display:flex;gap:16px;justify-content:flex-end;padding:2px 12px;font-size:12.5px;"
+        "line-height:20px}.emaviz-report{padding:6px 12px 0;font-size:14px}"
+        ".emaviz-share a{color:inherit;text-underline-offset:2px}"
+        "@media (min-width:900px){[data-dock-region=right] .emaviz-share{position:fixed;top:20px;right:34px;z-index:5}}"
         "</style>"
     )
-    return rules + _strip() + window_layout.style() + charts.style() + measure.style()
+    return rules + _strip() + _jobs() + window_layout.style() + charts.style() + measure.style()
 
 
 def _strip() -> Html:
@@ -103,6 +110,35 @@ def _strip() -> Html:
     return unescaped(f"<style>{wide}{{{rules}}}{wide} and {less}{{{narrow}}}</style>")
 
 
+def _jobs() -> Html:
+    """Lays the panel that holds `JOBS` along the bottom edge, over the strip's small print."""
+    panel = "[data-floating-window]:has(.emaviz-jobs)"
+    row, handles = f"{panel} div:has(> div > .emaviz-jobs)", ("griphandle", "strip", "header", "resize")
+    return unescaped(
+        f"<style>{panel}{{position:fixed!important;left:0!important;right:0!important;top:auto!important;"
+        f"bottom:0!important;width:100%!important;height:{_JOBS_HEIGHT_PX}px!important;transform:none!important;"
+        "border-radius:0!important;box-shadow:none!important;z-index:90!important;overflow:hidden!important;"
+        "border-top:2px solid var(--mantine-primary-color-filled,#2f6fde)}"
+        + ",".join(f"{panel} [data-dock-{handle}]" for handle in handles)
+        + "{display:none!important}"
+        f"{row}{{display:flex;align-items:center;gap:8px;padding:0 10px!important;height:{_JOBS_HEIGHT_PX - 2}px}}"
+        f"{row} > div{{flex:0 0 auto;padding:0!important;margin:0!important}}"
+        f"{row} > div:has(> .emaviz-jobs){{display:none}}{row} > div:has(.emaviz-job){{flex:1 1 0;min-width:0}}"
+        f"{row} button{{height:19px!important;min-height:0!important;padding:0 8px!important;font-size:12px!important;"
+        "width:auto!important}"
+        f"{row} .mantine-Button-section{{margin-inline:0 6px!important}}"
+        f"{row} span{{white-space:nowrap}}"
+        ".emaviz-job{display:flex;align-items:center;gap:12px;font-size:13px;line-height:20px;white-space:nowrap;"
+        "overflow:hidden}.emaviz-job > span{overflow:hidden;text-overflow:ellipsis}"
+        ".emaviz-job a{cursor:pointer;text-decoration:underline;text-underline-offset:2px}"
+        ".emaviz-job-share{flex:0 0 140px;height:7px;border-radius:4px;overflow:hidden;"
+        "background:rgba(134,142,150,.3)}"
+        ".emaviz-job-share > i{display:block;height:100%;background:var(--mantine-primary-color-filled,#2f6fde)}"
+        ".emaviz-job-unknown{width:30%;animation:emaviz-job 1.6s infinite alternate ease-in-out}"
+        "@keyframes emaviz-job{from{margin-left:0}to{margin-left:70%}}</style>"
+    )
+
+
 def unseen(controls: Sequence[str]) -> Html:
     """Takes controls off the screen, by their ids, for scripts to press."""
     rows = ",".join(f"div:has(> [id='{one}'])" for one in controls)
@@ -111,7 +147,8 @@ def unseen(controls: Sequence[str]) -> Html:
 
 def unseen_field(field: str) -> Html:
     """The same for a field of text, which its label alone names by its id."""
-    return unescaped(f"<style>.mantine-Flex-root:has(label[for='{field}']){{display:none!important}}</style>")
+    row = f".mantine-Flex-root:has(label[for='{field}'])"
+    return unescaped(f"<style>{row},div:has(> {row}){{display:none!important}}</style>")
 
 
 def caption(text: str) -> Html:

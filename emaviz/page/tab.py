@@ -12,7 +12,9 @@ from typing import Any, ClassVar, TypeVar, cast
 import viser
 
 from ema_model.text import COLOURS
+from emaviz.page.panel import RECORD
 from emaviz.page.playback import PlaybackStrip
+from emaviz.page.share import VIEW, Place, Sharing, share_line
 from emaviz.page.workspaces import Page, Workspace, Workspaces
 from emaviz.recording.viewer import ViewerHost
 from emaviz.server.uploads import Uploads
@@ -43,15 +45,20 @@ _GREY = Html("<style>div:has(> .emaviz-out-of-date) ~ div{opacity:.5;filter:gray
 class Standing:
     """Of one tab.  Everything here is done on the screen's thread."""
 
-    def __init__(self, provenance: Provenance, title: str, workspace: str, saved: bool) -> None:
-        """title, workspace: the tab's; saved: a session's file says that the result was there."""
+    def __init__(
+        self, provenance: Provenance, title: str, workspace: str, saved: bool, place: Callable[[], Place]
+    ) -> None:
+        """title, workspace: the tab's; saved: a session's file says that the result was there; place(): its address."""
         self.provenance, self.title, self.workspace, self.saved = provenance, title, workspace, saved
+        self._place = place
+        self._links: list[HtmlPiece] = []
         self._start: Any = None
         self._forget: list[Callable[[], object]] = []
         self._places: list[HtmlPiece] = []
 
     def add(self, gui: viser.GuiApi) -> None:
         """Here, where what follows in the same tab or folder is the result."""
+        self._links.append(add_html(gui))
         self._places.append(add_html(gui, visible=False))
 
     def connect(self, start: Any, forget: Callable[[], object] = lambda: None) -> None:
@@ -74,6 +81,14 @@ class Standing:
         for place in self._places:
             if place.content != content:
                 place.content, place.visible = content, bool(line)
+        links = Html() if self.provenance.of is None else share_line(self.workspace, self._place(), self._kinds())
+        for one in self._links:
+            if one.content != links:
+                one.content = links
+
+    def _kinds(self) -> list[str]:
+        kinds = [] if self.provenance.files is None else list(self.provenance.files.kinds)
+        return kinds + ([VIEW] if RECORD.suffix in kinds else [])
 
     def _banner(self, line: str) -> Html:
         press = Html()
@@ -102,9 +117,11 @@ class Standings:
         workspaces.entered.connect(lambda _: self.refresh())
         threading.Thread(target=self._look, name="emaviz-standings", daemon=True).start()
 
-    def add(self, provenance: Provenance, title: str, workspace: str, *, saved: bool) -> Standing:
+    def add(
+        self, provenance: Provenance, title: str, workspace: str, place: Callable[[], Place], *, saved: bool
+    ) -> Standing:
         """A tab's, as `Standing`."""
-        self._all.append(Standing(provenance, title, workspace, saved))
+        self._all.append(Standing(provenance, title, workspace, saved, place))
         return self._all[-1]
 
     def close(self) -> None:
@@ -149,6 +166,7 @@ class Shared:
     slow_screen: Worker  # draws what nobody watches while dragging
     files: Worker  # reads and packs files
     standings: Standings  # of the tabs' results
+    sharing: Sharing  # addresses of what tabs show
     tabs: dict[type[Tab], Tab] = field(default_factory=dict)
 
     def tab(self, kind: type[AnyTab]) -> AnyTab:
@@ -203,7 +221,18 @@ class Tab(ABC):
 
     def standing(self, provenance: Provenance, *, saved: bool = True) -> Standing:
         """Of a result of this tab; saved: a session's file says that it was there."""
-        return self.shared.standings.add(provenance, self.workspace.title, self.workspace.name, saved=saved)
+        if saved:
+            self.shared.sharing.results[self.workspace.name] = provenance
+        title, name = self.workspace.title, self.workspace.name
+        return self.shared.standings.add(provenance, title, name, self.place, saved=saved)
+
+    def place(self) -> Place:
+        """What is shown here, for an address; nothing, where that is always the same."""
+        return {}
+
+    def go_to(self, place: Place) -> None:
+        """Shows what an address says, as `place` gave it; InputError where it is not there any more."""
+        return
 
     @abstractmethod
     def build(self) -> None:

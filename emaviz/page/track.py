@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import plotly.graph_objects as go
@@ -13,6 +13,7 @@ from ema_model.errors import InputError
 from ema_model.faults import BY_NAME
 from ema_model.quantities.titles import in_sentence
 from ema_model.text import COLOURS
+from ema_model.tracking.evidence import LEAST_FLIGHTS
 from ema_model.tracking.flights import Flight
 from ema_model.tracking.history import History
 from ema_model.tracking.result import Tracked
@@ -33,6 +34,7 @@ from emaviz.page.panel import (
     PracticeButtons,
     Seal,
 )
+from emaviz.page.share import Place
 from emaviz.page.style import LONG_LABELS, unseen_field
 from emaviz.page.tab import Shared, Standing, Tab
 from emaviz.page.window_layout import COLUMNS, NEXT_COLUMN
@@ -149,6 +151,7 @@ _STEPS = (
     "You see which fault drifts and how many flights remain, as a distribution, today and at any earlier flight.",
 )
 _ASPECTS = (0.66, 0.42, 0.48)  # of the figures, height over width: the first stands beside the others
+_SO_FAR_ASPECT = 0.45  # of the figure of flights that are too few to follow
 
 
 class TrackResult:
@@ -166,7 +169,9 @@ class TrackResult:
         self._page, self._slow = page, slow
         self._history: History | None = None
         gui = page.server.gui
+        self._by_hand = False  # whether somebody has chosen the k that is shown
         self._told = add_html(gui, begin("No flights are tracked yet", _STEPS))
+        self._so_far = gui.add_plotly(go.Figure(), config=_CONFIG, aspect=_SO_FAR_ASPECT, visible=False)
         self._life = gui.add_folder("The unit's life", visible=False)
         with self._life:
             add_html(gui, COLUMNS + LONG_LABELS)
@@ -189,11 +194,21 @@ class TrackResult:
         with self._save:
             self._kept = keep()
         self._today.on_update(lambda event: event.client and slow.post("today", self._draw))
-        self._fault.on_update(lambda event: event.client and slow.post("today", self._draw))
+        self._fault.on_update(lambda event: event.client and self._choose())
+
+    def show_first(self, flights: Sequence[Flight], count: int) -> None:
+        """The first flights, before there are enough to follow; count: in all."""
+        self.show(None)
+        left_out = sum(bool(one.excluded) for one in flights)
+        more = f", {left_out} of them not usable" if left_out else ""
+        told = f"{len(flights)} of {count} flights are identified{more}. A trend is looked for from {LEAST_FLIGHTS} on."
+        self._told.content = html('<div {}><div style="font-size:16px;padding:4px 0">{}</div></div>', BOX, told)
+        self._so_far.figure, self._so_far.visible = tracking.k_so_far(flights, count), True
 
     def show(self, history: History | None) -> None:
         """Followed flights, as they are known at their end; None for none."""
         before, self._history = self._history, history
+        self._so_far.visible = False
         begun = before is None or history is None or before.flights[:1] != history.flights[:1]
         asked = before is None or history is None or begun or before.thresholds != history.thresholds
         last = history.last if history is not None else None
@@ -214,10 +229,34 @@ class TrackResult:
             if list(self._flight.options) != names:
                 self._flight.options = names
                 self._flight.value = names[0]
-            if asked:
+            self._by_hand = self._by_hand and not asked
+            if not self._by_hand:
                 self._fault.value = BY_NAME[_first(last)].label
+            if asked:
                 self._kept.clear()
         self._draw()
+
+    def place(self) -> Place:
+        """What is shown, for an address."""
+        if self._history is None or self._history.last is None:
+            return {}
+        then = [] if self._today.value >= self._today.max else [str(int(self._today.value))]
+        return {"k": [self._faults[str(self._fault.value)]], "today": then}
+
+    def go_to(self, place: Place) -> None:
+        """As `place` gave it; nothing before flights are followed."""
+        if self._history is None or self._history.last is None:
+            return
+        for name in place.get("k", ()):
+            if name in self._faults.values():
+                self._fault.value, self._by_hand = BY_NAME[name].label, True
+        days = [int(one) for one in place.get("today", ()) if one.isdecimal()]
+        self._today.value = min(max([*days, self._today.min] if days else [self._today.max]), self._today.max)
+        self._draw()
+
+    def _choose(self) -> None:
+        self._by_hand = True
+        self._slow.post("today", self._draw)
 
     def _chosen(self) -> Flight | None:
         last = self._history.last if self._history is not None else None
@@ -310,7 +349,7 @@ class TrackPanel:
             self._threshold = gui.add_number("Threshold", 0.5, min=0.0, max=1.0, step=0.001, disabled=True)
             self._all = add_html(gui)
         self._start = gui.add_button("Track", icon=viser.Icon.TIMELINE, disabled=True)
-        self._line = JobLine(page, following.job, pauses="it")
+        self._line = JobLine(page, following.job, WORKSPACE, pauses="it")
         self._watch = gui.add_checkbox(
             "Add new flights",
             following.watching,
@@ -326,6 +365,7 @@ class TrackPanel:
         following.job.began.connect(lambda _: post("track began", lambda: self._busy(True)))
         following.job.ended.connect(lambda _: post("track ended", lambda: self._busy(False)))
         following.events.followed.connect(lambda history: post("followed", lambda: result.show(history)))
+        following.events.began.connect(lambda *first: post("followed", lambda: result.show_first(*first)))
         following.events.left_out.connect(lambda: post("left out", self._show_left_out))
         self.refresh()
 
@@ -468,6 +508,18 @@ class TrackTab(Tab):
     def refresh_files(self) -> None:
         """What may be followed."""
         self.panel.refresh()
+
+    def place(self) -> Place:
+        """The folder of flights, the k that is shown, and today."""
+        return {"flights": [self.following.chosen], **self.result.place()}
+
+    def go_to(self, place: Place) -> None:
+        """Chooses the flights; of those that are followed, shows the k on the day."""
+        for name in place.get("flights", ())[:1]:
+            if name != self.following.chosen:
+                self.following.folder.inner(name)
+                self.panel.choose(name)
+        self.result.go_to(place)
 
     def kept(self) -> dict[str, Part]:
         """The flights, as they were identified."""

@@ -20,7 +20,7 @@ from emaviz.page.window_layout import Docked
 from emaviz.server.field_error import say_beside
 from emaviz.server.viser_private import Inside, id_of
 from emaviz.session.explore import Session
-from emaviz.session.jobs import Signal, Worker
+from emaviz.session.jobs import Job, Signal, Waiting, Worker
 from emaviz.text.html import add_html
 from emaviz.text.results import begun, within
 
@@ -301,7 +301,10 @@ class Page:
     workspaces: Workspaces  # which windows are where
     measuring: Measuring  # of charts over time
     folder: Path | None = None  # of the data, whose files messages name without it
+    job_tabs: dict[Job, str] = field(default_factory=dict)  # where each long run is asked for, by the workspace's name
     _refused: set[str] = field(default_factory=set)  # controls beside which something is said
+    _asked_by: dict[str, int] = field(default_factory=dict)  # the number of the run that each button has begun
+    _in_line: dict[str, Waiting] = field(default_factory=dict)  # what each button has asked for, and waits
 
     def notify(self, title: str, text: str, colour: Any = "red") -> None:
         """A message in every open browser."""
@@ -320,14 +323,17 @@ class Page:
         try:
             change()
         except InputError as error:
-            if control is None:
-                self.notify("Input refused", str(error))
-            else:
-                self.say_beside(control, str(error))
+            self._refuse(error, control)
             return False
         if control is not None:
             self.say_beside(control, "")
         return True
+
+    def _refuse(self, error: InputError, control: Any) -> None:
+        if control is None:
+            self.notify("Input refused", str(error))
+        else:
+            self.say_beside(control, str(error))
 
     def ask(self, kind: str, asked: Callable[[], Any], control: Any = None) -> None:
         """Does what was asked soon, on the screen's thread; what is refused stands beside the control that asked."""
@@ -337,32 +343,69 @@ class Page:
 
         self.screen.post(kind, checked)
 
-    def say_beside(self, control: Any, text: str) -> None:
-        """Stands below a control until it is used again; no text takes it away."""
+    def say_beside(self, control: Any, text: str, *, calm: bool = False) -> None:
+        """Stands below a control until it is used again; no text takes it away.  calm: it is no error."""
         if text or id_of(control) in self._refused:
             (self._refused.add if text else self._refused.discard)(id_of(control))
-            say_beside(Inside(self.server), control, self.local(text))
+            say_beside(Inside(self.server), control, self.local(text), calm=calm)
 
-    def begins(self, begin: Callable[[], bool], button: Any = None) -> bool:
-        """Begins a long run, or says why not, below the button that asks for it.
+    def begins(self, begin: Callable[[], bool], button: Any = None, title: str = "", of: str = "") -> bool:
+        """Begins a long run, or lets it wait for the one that goes on; else says why not, below the button that asks.
 
-        begin(): whether nothing else runs; InputError: what is missing.
+        begin(): whether nothing else runs; InputError: what is missing.  It takes what is chosen once it begins.
+        title: of what waits, by default the button's label; of: what the button asks for, where that is not always
+        the same.
         """
-        started = False
-
-        def tried() -> None:
-            nonlocal started
+        try:
             if not self.session.ready.is_set():
                 self._wait("One moment", "The models are still being compiled.", button)
-            elif not (started := begin()):
-                self.one_at_a_time(button)
+                return False
+            if not self._begin(begin, button, of):
+                self._line_up(begin, button, title, of)
+                return True
+        except InputError as error:
+            self._refuse(error, button)
+            return False
+        if button is not None:
+            self.say_beside(button, "")
+        return True
 
-        return self.checked(tried, button) and started
+    def _begin(self, begin: Callable[[], bool], button: Any, of: str) -> bool:
+        jobs = self.session.worker.jobs
+        before, begun = jobs.begun, begin()
+        if begun and button is not None and jobs.begun != before:
+            self._asked_by[id_of(button) + of] = jobs.begun
+        return begun
 
-    def one_at_a_time(self, button: Any = None) -> None:
-        """Says that another long run goes on; with a button by raising InputError, which `checked` says beside it."""
-        running = self.session.worker.doing or "Another long run"
-        self._wait("One at a time", f"{running} goes on; stop it first.", button)
+    def _line_up(self, begin: Callable[[], bool], button: Any, title: str, of: str) -> None:
+        """Waits behind what goes on, once for each thing that is asked for; InputError where that is what goes on."""
+        jobs = self.session.worker.jobs
+        running, uuid = jobs.running, of if button is None else id_of(button) + of
+        if running is not None and self._asked_by.get(uuid) == jobs.begun:
+            raise InputError(f"{running.job.title} goes on already; stop it first")
+
+        def begins() -> bool:
+            """Whether it has begun, or cannot, which is said."""
+            try:
+                return self._begin(begin, button, of)
+            except InputError as error:
+                self._in_line.pop(uuid, None)
+                self._refuse(error, button)
+                return True
+
+        def gone() -> None:
+            if self._in_line.pop(uuid, None) is not None and button is not None:
+                self.say_beside(button, "")
+
+        one = Waiting(title or (button.label if button is not None else "Another run"), begins, gone=gone)
+        before = self._in_line.get(uuid)
+        self._in_line[uuid] = one
+        text = f"in line: begins after {running.job.title if running else 'the run before'}"
+        if button is None:
+            self.notify(one.title, text, "blue")
+        else:
+            self.say_beside(button, text, calm=True)
+        jobs.add(one, before)
 
     def _wait(self, title: str, text: str, button: Any) -> None:
         if button is not None:

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import plotly.graph_objects as go
 
 from ema_model import faults
 from ema_model.campaign.store import Store, failed, summaries
@@ -86,15 +87,10 @@ class Distributions(Section[Rows]):
 
     def body(self, subject: Rows, figures: Figures) -> str:
         """Left out where no truth is known."""
-        known = {
-            group: [row for row in rows if row["k_true"] is not None]
-            for group, rows in subject.grouped("identify").items()
-        }
-        known = {group: rows for group, rows in known.items() if len(rows) >= _LEAST}
+        known = of_known_truth(subject, _LEAST)
         if not known:
             return ""
-        errors = {group: [row["error_wrapped_percent"] for row in rows] for group, rows in known.items()}
-        parts = [figures.place(campaign.error_distribution("Error of the identified k", "Err [%]", errors), 360)]
+        parts = [figures.place(errors_drawn(known), 360)]
         drawn = []
         for i, fault in enumerate(faults.FAULTS):
             off = {group: [_off(row, i) for row in rows] for group, rows in known.items()}
@@ -102,6 +98,20 @@ class Distributions(Section[Rows]):
             drawn.append(figures.place(campaign.error_distribution(title, f"Δ{fault.name} [-]", off), 280))
         parts += [pair(*drawn[at : at + 2]) for at in range(0, len(drawn), 2)]
         return "".join(parts)
+
+
+def of_known_truth(subject: Rows, least: int = 1) -> dict[str, list[dict[str, Any]]]:
+    """Identifications by group, of groups with so many or more."""
+    known = {
+        group: [row for row in rows if row["k_true"] is not None] for group, rows in subject.grouped("identify").items()
+    }
+    return {group: rows for group, rows in known.items() if len(rows) >= least}
+
+
+def errors_drawn(known: dict[str, list[dict[str, Any]]]) -> go.Figure:
+    """How Err is spread in each group."""
+    errors = {group: [row["error_wrapped_percent"] for row in rows] for group, rows in known.items()}
+    return campaign.error_distribution("Error of the identified k", "Err [%]", errors)
 
 
 def _off(row: dict, i: int) -> float:
@@ -124,23 +134,26 @@ class Answers(Section[Rows]):
 
     def body(self, subject: Rows, figures: Figures) -> str:
         """Left out where nothing was discovered or compared."""
-        parts = []
-        for kind, title, answer in (
-            ("discover", "What was named", _named),
-            ("compare", "What explains the residual first", _explained),
-        ):
-            rows = [(row, answer(row)) for row in subject.answers(kind)]
-            told = [(row, one) for row, one in rows if one is not None]
-            if not told:
-                continue
-            often = {one for one, _ in Counter(one for _, one in told).most_common(_MOST_ANSWERS)}
-            counts: dict[str, Counter[str]] = {}
-            for row, one in told:
-                case = " · ".join(filter(None, (row["group"], row["case"])))
-                counts.setdefault(case, Counter())[one if one in often else "another"] += 1
-            height = 130 + _ROW_PX * len(counts)
-            parts.append(figures.place(campaign.counted(title, counts), height))
-        return "".join(parts)
+        return "".join(
+            figures.place(campaign.counted(title, counts), 130 + _ROW_PX * len(counts))
+            for title, counts in answers(subject).items()
+        )
+
+
+def answers(subject: Rows) -> dict[str, dict[str, Counter[str]]]:
+    """How often what was answered, by case, of each kind of answer that there is."""
+    found: dict[str, dict[str, Counter[str]]] = {}
+    for kind, title, answer in (
+        ("discover", "What was named", _named),
+        ("compare", "What explains the residual first", _explained),
+    ):
+        rows = [(row, answer(row)) for row in subject.answers(kind)]
+        told = [(row, one) for row, one in rows if one is not None]
+        often = {one for one, _ in Counter(one for _, one in told).most_common(_MOST_ANSWERS)}
+        for row, one in told:
+            case = " · ".join(filter(None, (row["group"], row["case"])))
+            found.setdefault(title, {}).setdefault(case, Counter())[one if one in often else "another"] += 1
+    return found
 
 
 def _named(row: dict[str, Any]) -> str | None:

@@ -9,7 +9,7 @@ from emaviz.server.viser_private import Inside, id_of
 from emaviz.text.results import begun
 
 _SAY = r"""
-((id, text) => {
+((id, text, calm) => {
   const field = document.getElementById(id);
   if (!field) return;
   const button = field.tagName === 'BUTTON';
@@ -20,18 +20,20 @@ _SAY = r"""
     line = document.createElement('div');
     line.className = 'emaviz-beside';
     line.setAttribute('role', 'alert');
-    line.style.cssText = 'font-size:12px;line-height:1.35;padding:2px 2px 0;overflow-wrap:anywhere;'
-      + 'color:light-dark(#e03131,#ff8787)';
+    line.style.cssText = 'font-size:12px;line-height:1.35;padding:2px 2px 0;overflow-wrap:anywhere';
     home.append(line);
     home.addEventListener(button ? 'click' : 'input', () => line.remove(), { once: true });
   }
+  line.style.color = calm ? 'var(--mantine-color-dimmed)' : 'light-dark(#e03131,#ff8787)';
   line.textContent = text;
-})(ID, TEXT)
+})(ID, TEXT, CALM)
 """
 
 
-def say_beside(inside: Inside, control: Any, text: str, client: int | None = None) -> None:
-    """Says it in one page, or in all that are open; no text takes it away."""
-    source = _SAY.replace("(ID, TEXT)", f"({json.dumps(id_of(control))}, {json.dumps(begun(text))})")
+def say_beside(inside: Inside, control: Any, text: str, client: int | None = None, *, calm: bool = False) -> None:
+    """Says it in one page, or in all that are open; no text takes it away.  calm: it is no error."""
+    source = _SAY.replace(
+        "(ID, TEXT, CALM)", f"({json.dumps(id_of(control))}, {json.dumps(begun(text))}, {json.dumps(calm)})"
+    )
     for one in inside.pages() if client is None else (client,):
         inside.run(source, one)

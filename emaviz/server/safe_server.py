@@ -15,8 +15,9 @@ import inspect
 import socket
 import threading
 from collections.abc import Awaitable, Callable
+from dataclasses import dataclass
 from typing import Any
-from urllib.parse import unquote, urlsplit
+from urllib.parse import quote, unquote, urlsplit
 
 import viser
 import websockets.asyncio.server
@@ -30,9 +31,20 @@ from emaviz.server.messages import LARGEST_FRAME
 from emaviz.server.viser_private import keep_icons
 
 SCENES = "/scenes/"  # below which the actuator's saved scenes are served
+RESULTS = "/results/"  # below which files of results are served, as links ask for them
 SIGNALS = "/signals"  # where the page's script asks about charts
 _OWN_HEADER = "X-Emaviz"  # of such a question: no other page's script can send it without asking first
 _opening = threading.Lock()
+
+
+@dataclass(frozen=True)
+class Kept:
+    """A file that is sent, or where it is shown instead."""
+
+    body: bytes = b""
+    kind: str = ""  # its media type
+    save: str = ""  # under which name a browser saves it; "": it is shown
+    at: str = ""  # an address that shows it
 
 
 def open_server(
@@ -42,12 +54,13 @@ def open_server(
     viewer: Callable[[], str | None] = lambda: None,
     scene: Callable[[str], bytes | None] = lambda _: None,
     signals: Callable[[str], bytes | None] = lambda _: None,
+    results: Callable[[str, str], Kept | None] = lambda *_: None,
 ) -> viser.ViserServer:
     """A viser server on exactly this address; InputError if it cannot be had.
 
     door: who gets an answer, by default this machine alone; viewer: the address of the Rerun viewer, which the page
     may show, once there is one; scene(name): a page below `SCENES`, or None; signals(query): JSON at `SIGNALS`, or
-    None.  Both are called on threads of their own.
+    None; results(name, query): a file below `RESULTS`, or None.  They are called on threads of their own.
     """
     door = Door(host) if door is None else door
     _check_free(host, port)
@@ -59,7 +72,7 @@ def open_server(
 
         def guarded(handler: Any, *arguments: Any, process_request: Any = None, **options: Any) -> Any:
             options |= {"max_size": LARGEST_FRAME, "logger": complain.log()}
-            guard = _guard(process_request, door, viewer, scene, signals)
+            guard = _guard(process_request, door, viewer, scene, signals, results)
             return plain(_listening(handler, opened, complain), *arguments, process_request=guard, **options)
 
         websockets.asyncio.server.serve = guarded  # type: ignore[assignment]
@@ -123,6 +136,7 @@ def _guard(
     viewer: Callable[[], str | None],
     scene: Callable[[str], bytes | None],
     signals: Callable[[str], bytes | None],
+    results: Callable[[str, str], Kept | None],
 ) -> Callable[..., Awaitable[Response | None]]:
     async def process_request(connection: ServerConnection, request: Request) -> Response | None:
         port = connection.local_address[1]
@@ -138,6 +152,10 @@ def _guard(
             response = _answer(
                 await asyncio.to_thread(signals, asked.query) if own else None, "application/json", "chart"
             )
+        elif path.startswith(RESULTS):
+            foreign = request.headers.get("Sec-Fetch-Site") == "cross-site"  # another page's link writes nothing here
+            name = path.removeprefix(RESULTS)
+            response = _sent(None if foreign else await asyncio.to_thread(results, name, asked.query))
         else:
             response = None if inner is None else inner(connection, request)
         if inspect.isawaitable(response):
@@ -168,6 +186,18 @@ def _named(body: bytes, zipped: bool) -> bytes:
     plain = gzip.decompress(body) if zipped else body
     named = plain.replace(b"<title>Viser</title>", b"<title>emaviz</title>", 1)
     return gzip.compress(named, compresslevel=1, mtime=0) if zipped else named
+
+
+def _sent(kept: Kept | None) -> Response:
+    """A result's file, or the way to where it is shown."""
+    if kept is None or not kept.at:
+        response = _answer(None if kept is None else kept.body, "" if kept is None else kept.kind, "result")
+        if kept is not None and kept.save:
+            response.headers["Content-Disposition"] = f"attachment; filename*=UTF-8''{quote(kept.save)}"
+        return response
+    status = http.HTTPStatus.SEE_OTHER
+    headers = Headers({"Location": kept.at, "Content-Length": "0", "Connection": "close", "Cache-Control": "no-store"})
+    return Response(status, status.phrase, headers, b"")
 
 
 def _answer(body: bytes | None, kind: str, what: str) -> Response:

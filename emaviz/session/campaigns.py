@@ -1,16 +1,25 @@
-"""Campaigns on the page: folders with rows, and a row computed again as a run, with its recording."""
+"""Campaigns on the page: begun from a plan, folders with rows, and a row computed again as a run."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import os
+import re
+import threading
+from collections.abc import Generator, Sequence
+from contextlib import suppress
+from dataclasses import dataclass
 from datetime import datetime
 from pathlib import Path
 from typing import Any
 
 import msgspec
 
+from ema_model.actuator import load_actuator
 from ema_model.campaign.kinds import KINDS
+from ema_model.campaign.plan import Plan, load_plan, shipped_plans
 from ema_model.campaign.plan_axes import TaskInputs, inputs_of
+from ema_model.campaign.run import Status, duration, estimate_s, run_plan
+from ema_model.campaign.schedulers import scheduler
 from ema_model.campaign.store import Store
 from ema_model.campaign.task import Task
 from ema_model.comparison import compare
@@ -23,10 +32,29 @@ from ema_model.recordings import Measurement
 from emaviz.session.data_folder import DataFolder
 from emaviz.session.explore import Session
 from emaviz.session.inputs import Inputs, digest, version_of
-from emaviz.session.jobs import Job, Signal, Tell
+from emaviz.session.jobs import Job, Run, Signal, Steps, Stopped, Tell
 
 _HEADER = "campaign.json"
 _DEPTHS = ("*", "*/*")  # below the data folder
+_OWN, _PLANS = "campaigns", "plans"  # folders of the data folder: of campaigns that begin here, of plans of one's own
+REPORT = "report.html"
+_THESIS = ("thesis_quick", "thesis")  # the plans of which a report and a recording are set beside the thesis
+_NAME = re.compile(r"\w[\w.() +-]{0,60}")
+_LOOK_S = 0.1
+
+
+@dataclass(frozen=True)
+class Computing:
+    """What a campaign begins with."""
+
+    plan: str  # of `Campaigns.plans`
+    name: str  # of its folder
+    workers: int = 1
+
+    @property
+    def reproduces(self) -> bool:
+        """Whether it is the thesis's evaluation."""
+        return self.plan in _THESIS
 
 
 class Campaigns:
@@ -34,7 +62,10 @@ class Campaigns:
 
     def __init__(self, session: Session, data: DataFolder, given: Sequence[Path] = ()) -> None:
         self.job = Job(session.worker)
+        self.computing = Job(session.worker, on_stop=lambda: "Stopped; all rows so far are kept, and it goes on there.")
         self.opened: Signal[[Path, Measurement]] = Signal()  # a row's recording, and its run
+        self.grown: Signal[[str]] = Signal()  # name of a campaign that has begun, or has rows more
+        self.written: Signal[[str, list[Path]]] = Signal()  # such a name, and its report, and a recording
         self._recorded: tuple[Path, Measurement, str] | None = None
         self._session, self._data = session, data
         self._given = [Store(path).folder for path in given]
@@ -50,11 +81,102 @@ class Campaigns:
             raise InputError(f"{shown(name)}: no such campaign; read the folder again")
         return Store(folders[name])
 
+    def report(self, name: str) -> Path | None:
+        """A campaign's report, by its campaign's name and its own, or None; of the data folder alone."""
+        path = self._data.folder / name
+        fits = path.name == REPORT and self._data.holds(path) and (path.parent / _HEADER).is_file()
+        return path if fits and path.is_file() else None
+
     def inputs(self, name: str) -> Inputs:
         """What a campaign's tables are made from now."""
         folder = self._folders().get(name)
         rows = "" if folder is None else " ".join(sorted(version_of(one) for one in folder.rglob("*.parquet")))
         return Inputs(name, name, options={"the set of its rows": digest(rows)})
+
+    # --- one that begins --------------------------------------------------------------------------------------------
+
+    def plans(self) -> list[str]:
+        """The thesis's evaluation, the shipped plans, and those of one's own in the data folder's `plans`."""
+        own = sorted((self._data.folder / _PLANS).glob("*.toml"))
+        named = [f"{_PLANS}/{path.name}" for path in own if self._data.holds(path)]
+        return [*_THESIS, *named, *(name for name in shipped_plans() if name not in _THESIS)]
+
+    @staticmethod
+    def cores() -> int:
+        """That this process may use, but for one, with which the page goes on."""
+        return max(1, len(os.sched_getaffinity(0)) - 1 if hasattr(os, "sched_getaffinity") else 1)
+
+    def about(self, asked: Computing) -> str:
+        """What it would compute, and for how long, in a sentence."""
+        plan, there, known = self._plan(asked.plan), set[str](), dict[str, float]()
+        with suppress(InputError):  # nothing is there yet
+            store = Store(self._folder(asked))
+            there, known = store.names(errors=True), store.seconds()
+        left = sum(task.name not in there for task in plan.tasks)
+        if not left:
+            return f"{plan.title}: all {len(plan.tasks)} tasks have a row in {_OWN}/{asked.name}."
+        takes = duration(estimate_s(plan, there, asked.workers, known))
+        begun = f", {len(plan.tasks) - left} of them are there" if left < len(plan.tasks) else ""
+        return f"{plan.title}: {len(plan.tasks)} tasks{begun}. About {takes}."
+
+    def begin(self, asked: Computing) -> bool:
+        """Computes what the folder lacks, in processes of their own; False while another long run goes on."""
+        plan, folder = self._plan(asked.plan), self._folder(asked)
+        if asked.workers < 1:
+            raise InputError("a campaign needs a process or more")
+        name, count = f"{_OWN}/{asked.name}", 0
+
+        def work(run: Run) -> Steps:
+            nonlocal count
+            run("beginning")
+            for status in _computed(plan, folder, asked.workers, run):
+                if status is not None and (rows := status.there + status.computed) != count:
+                    count = rows
+                    self.grown(name)
+                yield
+            self.grown(name)
+            run("writing the report", 0.99)
+            yield
+            self.written(name, self._write(asked, Store(folder)))
+
+        def done() -> str:
+            errors = sum(one["errors"] for one in Store(folder).progress().values())
+            return f"{plan.title}: {count} rows" + (f", {errors} of them an error." if errors else ".")
+
+        return self.computing.begin(plan.title, work, done)
+
+    def _plan(self, name: str) -> Plan:
+        if name not in self.plans():
+            raise InputError(f"{shown(name, 60)}: no such plan; choose one of the list")
+        return load_plan(self._data.folder / name if name.startswith(f"{_PLANS}/") else name)
+
+    def _folder(self, asked: Computing) -> Path:
+        if not _NAME.fullmatch(asked.name):
+            raise InputError(f"{shown(asked.name, 60)!r}: a campaign's name is of letters, digits and . ( ) + - _")
+        path = self._data.folder / _OWN / asked.name
+        if not self._data.holds(path):
+            raise InputError(f"{shown(asked.name, 60)}: leads out of the data folder; give another name")
+        return path
+
+    def _write(self, asked: Computing, store: Store) -> list[Path]:
+        """The report, in the campaign's folder; beside the thesis also a recording, where the viewer finds it."""
+        from emaviz.report import campaign, reproduce  # plotly takes a second to import
+
+        path = store.folder / REPORT
+        if not asked.reproduces:
+            campaign.write_campaign_report(store, path)
+            return [path]
+        from ema_model.campaign.thesis import Evaluation, drawn
+        from emaviz.recording.entry import free_name  # as does rerun
+        from emaviz.recording.reproduce import write_reproduction
+
+        found, responses = Evaluation(store), drawn(load_actuator())
+        reproduce.write_reproduction_report(found, responses, path)
+        recording = free_name(self._session.folder, asked.name, ".rrd")
+        write_reproduction(found, responses, recording)
+        return [path, recording]
+
+    # --- a row as a run ---------------------------------------------------------------------------------------------
 
     def open_row(self, campaign: str, row_name: str) -> bool:
         """Computes a row's task again and writes its recording; False while another long run goes on."""
@@ -93,6 +215,35 @@ class Campaigns:
         path, run, said = self._recorded
         self.opened(path, run)
         return said
+
+
+def _computed(plan: Plan, folder: Path, workers: int, run: Run) -> Generator[Status | None, None, None]:
+    """How far it is, several times a second, while processes compute; a stop ends them, and keeps their rows."""
+    at: list[Status] = []
+    failed: list[BaseException] = []
+
+    def told(status: Status) -> None:
+        at[:] = [status]
+        if run.stopping:
+            raise Stopped
+
+    def compute() -> None:
+        try:
+            run_plan(plan, folder, scheduler(None, workers), on_progress=told)
+        except BaseException as error:
+            failed.append(error)
+
+    thread = threading.Thread(target=compute, name="emaviz-campaign", daemon=True)
+    thread.start()
+    while thread.is_alive():
+        thread.join(_LOOK_S)
+        if at:
+            rows = at[0].there + at[0].computed
+            errors = f", {at[0].errors} of them an error" if at[0].errors else ""
+            run.say(f"{rows} of {at[0].total} rows{errors}", rows / max(at[0].total, 1))
+        yield at[0] if at else None
+    if failed:
+        raise failed[0]
 
 
 def _named(task: Task) -> str:

@@ -346,6 +346,7 @@ class Identifying:
         self.identified: Signal[[Race]] = Signal()
         self.provenance = Provenance("the answer", "Identify", inputs, self.job)
         self.answer: Identification | None = None
+        self.race: Race | None = None  # of which it is
         self.answered_at: datetime | None = None
         self._monitor, self._folder, self._told = monitor, folder, told
 
@@ -401,7 +402,28 @@ class Identifying:
             race.path = None if story.failed else story.path
             if story.failed:
                 self._told("The recording could not be written", story.failed)
+        self.race = race
         self.identified(race)
+
+    def keep(self, suffix: str) -> Path:
+        """The last answer's recording (.rrd), or its report (.html), which is written; on the compute thread.
+
+        InputError before there is an answer, and where its recording could not be written.
+        """
+        race = self.race
+        if race is None or race.best is None or race.best.answer is None:
+            raise InputError("nothing is identified yet; press Identify first")
+        if suffix == ".rrd":
+            if race.path is None:
+                raise InputError("the recording of this identification could not be written")
+            return race.path
+        from emaviz.recording.entry import free_name
+        from emaviz.report import write_identification_report  # plotly takes a second to import
+
+        path = free_name(self._folder, f"{datetime.now():%Y%m%d-%H%M%S}-identify", ".html")
+        configuration = readable(race.settings)
+        write_identification_report(race.best.answer, race.objective, path, configuration=configuration)
+        return path
 
     def _story(self, race: Race, measurement: Measurement) -> IdentificationStory | None:
         settings = race.settings

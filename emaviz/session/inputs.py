@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Callable, Mapping
+import threading
+from collections.abc import Callable, Collection, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +16,7 @@ from emaviz.session.session_file import Part
 from emaviz.session.settings import taken
 
 _MOST_NAMES = 3
+_WRITTEN_S = 60.0  # in which a result's file is
 
 
 class Inputs(msgspec.Struct, frozen=True):
@@ -59,6 +61,46 @@ class SavedResult(msgspec.Struct, frozen=True):
     running: str = ""  # what was being computed when it was saved
 
 
+class ResultFiles:
+    """Report and recording of the result that a tab shows, each written once, when a link asks for it."""
+
+    def __init__(self, kinds: Collection[str], shown: Callable[[], object], save: Callable[[str], object]) -> None:
+        """kinds: suffixes; shown(): what is shown, None for nothing; save(suffix): writes it soon, and `came` then."""
+        self.kinds, self._shown, self._save = kinds, shown, save
+        self._made: dict[str, tuple[object, Path]] = {}
+        self._awaited: dict[str, threading.Event] = {}
+        self._making = threading.Lock()
+
+    def clear(self) -> None:
+        """Something else is shown."""
+        self._made.clear()
+
+    def came(self, path: Path) -> bool:
+        """A file is written; whether a link had asked for it."""
+        self._made[path.suffix] = self._shown(), path
+        awaited = self._awaited.pop(path.suffix, None)
+        if awaited is not None:
+            awaited.set()
+        return awaited is not None
+
+    def make(self, suffix: str) -> Path | None:
+        """Of what is shown now; None where that is nothing, or it cannot be written."""
+        with self._making:
+            shown = self._shown()
+            if shown is None or suffix not in self.kinds:
+                return None
+            if (path := self._known(suffix, shown)) is None:
+                come = self._awaited[suffix] = threading.Event()
+                self._save(suffix)
+                path = self._known(suffix, shown) if come.wait(_WRITTEN_S) else None
+                self._awaited.pop(suffix, None)
+            return path
+
+    def _known(self, suffix: str, shown: object) -> Path | None:
+        of, path = self._made.get(suffix, (None, None))
+        return path if path is not None and of == shown and path.is_file() else None
+
+
 class Provenance:
     """Of the result that a tab shows.  Read and written on any thread."""
 
@@ -76,6 +118,7 @@ class Provenance:
         """
         self.what, self.start, self.now = what, start, now
         self.of: Inputs | None = None  # what is shown; None for nothing
+        self.files: ResultFiles | None = None  # what can be written of it
         self.missing: SavedResult | None = None  # a session had it, and it is to be computed again
         self._job, self._soon = job, soon
         self._restored = False  # a session brought the result itself

@@ -1,4 +1,4 @@
-"""Jobs on the one compute thread, one after another: how far each is, its Pause and its Stop."""
+"""Jobs on the one compute thread, one after another: how far each is, its Pause and its Stop, and those that wait."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ import threading
 import time
 import traceback
 from collections.abc import Callable, Generator
+from dataclasses import dataclass, field
 from typing import Generic, ParamSpec, Protocol
 
 from ema_model.errors import InputError, quoted
@@ -80,6 +81,7 @@ class Worker:
         self._long: Steps | None = None
         self._title = ""  # of the long job that was begun last
         self.progress = ""  # how far that says it is
+        self.jobs = Jobs(self)  # the long ones: which runs, and which wait
         self._closing = False
         self._thread = threading.Thread(target=self._run, name=name, daemon=True)
         self._thread.start()
@@ -111,7 +113,7 @@ class Worker:
                 job = self._next_job()
             if job is None:
                 return
-            self._guarded(job)
+            self.guarded(job)
             self._attended = time.monotonic()
 
     @property
@@ -153,14 +155,14 @@ class Worker:
                 if self._closing:
                     break
             if job is not None:
-                self._guarded(job)
+                self.guarded(job)
                 self._attended = time.monotonic()
             elif self._long is not None:
                 started = time.monotonic()
-                self._guarded(self._step)
+                self.guarded(self._step)
                 self._yield_to_quick_jobs(time.monotonic() - started)
         if self._long is not None:
-            self._guarded(self._long.close)
+            self.guarded(self._long.close)
 
     def _yield_to_quick_jobs(self, step_s: float) -> None:
         """Rests after a step while quick jobs keep coming, so that they, and who draws them, find the machine free."""
@@ -188,7 +190,7 @@ class Worker:
             self._long = None  # before the error is told, so that another may be started at once
             raise
 
-    def _guarded(self, job: Call) -> None:
+    def guarded(self, job: Call) -> None:
         """Runs a job; an error is told, and the thread goes on."""
         try:
             job()
@@ -197,6 +199,137 @@ class Worker:
                 self._on_error(error)
             except Exception:
                 traceback.print_exc()
+
+
+# --- which long run goes on, and which wait for it: one list for all tabs ---------------------------------------------
+
+_LOOK_S = 0.25  # between two looks whether it is a run's turn
+RESTED = 2  # looks at a compute thread that is free, after which nobody is about to ask for it
+
+
+@dataclass(eq=False)
+class Waiting:
+    """A run that is asked for, and begins as soon as no other goes on, and what it waits for besides has ended.
+
+    begin(): whether there is no more to wait for; it takes what is chosen then.  waits_for(): what else must end
+    before, in words.  says(text): for what it waits, while it does; gone(): it does not any more.  rests: looks that
+    must find the compute thread free, so that what a person asks for meanwhile goes first.
+    """
+
+    title: str
+    begin: Callable[[], bool]
+    waits_for: Callable[[], str] = lambda: ""
+    says: Callable[[str], object] = lambda text: None
+    gone: Callable[[], object] = lambda: None
+    rests: int = 0
+    free: int = field(default=0, init=False)  # looks that have found it so, one after another
+
+
+@dataclass(frozen=True)
+class AtWork:
+    """How far the run is that goes on."""
+
+    job: Job
+    text: str  # what it does
+    elapsed_s: float
+    share: float | None  # that is done, if that is known
+
+
+@dataclass(frozen=True)
+class Ended:
+    """A run that is over."""
+
+    job: Job
+    title: str
+    stopped: bool  # by a person
+
+
+class Jobs:
+    """Of one compute thread.  `changed` is called on the threads that work, so that listeners only hand over."""
+
+    def __init__(self, worker: Worker) -> None:
+        self.changed: Signal[[]] = Signal()
+        self.running: AtWork | None = None
+        self.begun = 0  # runs so far
+        self.ended: Ended | None = None  # the run before
+        self._worker = worker
+        self._waiting: list[Waiting] = []
+        self._lock = threading.RLock()
+        self._come = threading.Event()
+        self._looks: threading.Thread | None = None
+
+    @property
+    def waiting(self) -> tuple[Waiting, ...]:
+        """In their order."""
+        with self._lock:
+            return tuple(self._waiting)
+
+    def add(self, one: Waiting, instead_of: Waiting | None = None) -> None:
+        """One more, at the end, or where another one stands that it replaces."""
+        with self._lock:
+            if instead_of in self._waiting:
+                self._waiting[self._waiting.index(instead_of)] = one
+            else:
+                self._waiting.append(one)
+            if self._looks is None:
+                self._looks = threading.Thread(target=self._look_on, name="emaviz-jobs-wait", daemon=True)
+                self._looks.start()
+        self._come.set()
+        self.changed()
+
+    def remove(self, one: Waiting | None) -> None:
+        """It does not wait any more."""
+        with self._lock:
+            if one is None or one not in self._waiting:
+                return
+            self._waiting.remove(one)
+        one.gone()
+        self.changed()
+
+    def began(self, job: Job) -> None:
+        """It runs from now on."""
+        self.begun += 1
+        self.running = AtWork(job, job.title, 0.0, None)
+        self.changed()
+
+    def told(self, job: Job, text: str, elapsed_s: float, share: float | None) -> None:
+        """How far it is."""
+        self.running = AtWork(job, text, elapsed_s, share)
+        self.changed()
+
+    def over(self, ended: Ended) -> None:
+        """It runs no more."""
+        self.running, self.ended = None, ended
+        self.changed()
+
+    def _look_on(self) -> None:
+        while not self._worker.closing:
+            if not self.waiting:
+                self._come.wait(1.0)
+                self._come.clear()
+                continue
+            self._look()
+            self._come.wait(_LOOK_S)
+            self._come.clear()
+
+    def _look(self) -> None:
+        for one in sorted(self.waiting, key=lambda one: one.rests):
+            what = one.waits_for() or self._worker.goes_on
+            one.free = 0 if what else one.free + 1
+            if one.free > one.rests and self._begins(one):
+                self.remove(one)
+            elif one in self.waiting:
+                one.says(f"{one.title}: waiting {f'for {what}' if what else 'its turn'} …")
+
+    def _begins(self, one: Waiting) -> bool:
+        begun = True  # one that fails does not wait any more
+
+        def begin() -> None:
+            nonlocal begun
+            begun = one.begin()
+
+        self._worker.guarded(begin)
+        return begun
 
 
 # --- how far a job is that tells in words what it does: as far as its last run was when it said the same --------------
@@ -235,8 +368,6 @@ class Pace:
 
 _TICK_S = 0.5
 _PAUSE_S = 0.01  # between two looks whether to go on; sliders are answered in between
-_LOOK_S = 0.25  # between two looks whether it is a run's turn
-RESTED = 2  # looks at a compute thread that is free, after which nobody is about to ask for it
 
 
 class Tell(Protocol):
@@ -346,15 +477,15 @@ class Job:
         self.ended: Signal[[str]] = Signal()  # what came of it
         self._worker, self._on_stop, self._on_divergence = worker, on_stop, on_divergence
         self._run: Run | None = None
-        self._awaited = ""  # title of the run that waits
+        self._awaited: Waiting | None = None
         self._pace = Pace()
-        self._over = threading.Event()  # set: whoever waits to begin shall not any more
-        self._over.set()
 
     @property
     def title(self) -> str:
         """Of the run that goes on, or waits for its turn; "" for none."""
-        return self._run.title if self.running and self._run is not None else self._awaited if self.waiting else ""
+        return (
+            self._run.title if self.running and self._run is not None else self._awaited.title if self._awaited else ""
+        )
 
     @property
     def paused(self) -> bool:
@@ -364,7 +495,7 @@ class Job:
     @property
     def waiting(self) -> bool:
         """Whether a run waits for its turn."""
-        return not self._over.is_set()
+        return self._awaited is not None
 
     def begin(self, title: str, work: Work, done: Callable[[], str | None] | None = None) -> bool:
         """Runs it soon; False, and nothing is begun, while another long run goes on, or the end of one is to be told.
@@ -375,8 +506,9 @@ class Job:
         run = Run(title, self._tells, self._worker)
 
         def taken() -> None:
-            self._over.set()
+            self._give_up()
             self._run, self.running, self.finished, self.error = run, True, False, ""
+            self._worker.jobs.began(self)
             self.began(title)  # before its end, which may come at once
 
         return not self.running and self._worker.start(self._steps(run, work, done), title, taken)
@@ -386,32 +518,27 @@ class Job:
     ) -> None:
         """Calls begin() until that is true, as soon as no other long run goes on; says meanwhile for what it waits.
 
-        It gives up once another run begins first, or it is stopped.
+        It gives up once another run of this job begins first, or it is stopped.
         waits_for(): what else must end before, in words; rests: how many looks must find the compute thread free, so
         that whatever a person asks for meanwhile goes first.
         """
-        self._over.set()
-        self._awaited = title
-        self._over = over = threading.Event()
 
-        def wait() -> None:
-            free = 0
-            while not over.is_set():
-                what = waits_for() or self._worker.goes_on
-                free = 0 if what else free + 1
-                if free > rests and begin():
-                    over.set()
-                    self.waits("")
-                    return
-                if not self.running and not over.is_set():  # else its line says how far that is
-                    self.waits(f"{title}: waiting {f'for {what}' if what else 'its turn'} …")
-                over.wait(_LOOK_S)
+        def says(text: str) -> None:
+            if not self.running:  # else its line says how far that is
+                self.waits(text)
 
-        threading.Thread(target=wait, name="emaviz-job-waits", daemon=True).start()
+        def gone() -> None:
+            if self._awaited is one:
+                self._awaited = None
+                self.waits("")
+
+        one = Waiting(title, begin, waits_for, says, gone, rests)
+        before, self._awaited = self._awaited, one
+        self._worker.jobs.add(one, before)
 
     def stop(self) -> None:
         """Ends what runs, as soon as its present simulation is done, or the wait for its turn."""
-        self._over.set()
+        self._give_up()
         if self._run is not None:
             self._run.stop()
 
@@ -421,11 +548,17 @@ class Job:
             self._run.pause(paused)
             self.rests(self.paused)
 
+    def _give_up(self) -> None:
+        """Who waits to begin shall not any more."""
+        self._worker.jobs.remove(self._awaited)
+
     def _tells(self, text: str, elapsed_s: float, share: float | None) -> None:
         known = self._pace.at(text, elapsed_s)
         share = known if share is None else share
         said = "" if self._run is not None and text == self._run.title else f"{text}, "
         self._worker.progress = f"{said}{going_on(elapsed_s, share)}"
+        if self.running:
+            self._worker.jobs.told(self, text, elapsed_s, share)
         self.progressed(text, elapsed_s, share)
 
     def _steps(self, run: Run, work: Work, done: Callable[[], str | None] | None) -> Steps:
@@ -459,8 +592,12 @@ class Job:
         self._end("")
 
     def _end(self, text: str, done: Callable[[], str | None] | None = None) -> None:
+        run = self._run
+
         def ended() -> None:
             self.running = False
+            if run is not None:
+                self._worker.jobs.over(Ended(self, run.title, run.stopping))
             self.ended((done() if done is not None else None) or text)
 
         self._worker.post(f"end of {id(self)}", ended)

@@ -141,7 +141,8 @@ _FOLLOWING = 0.02  # share of the bar that following takes, after flights were i
 class TrackEvents:
     """What the screen listens to, besides the job; called on the threads that work, so listeners only hand over."""
 
-    followed: Signal[[History]] = field(default_factory=Signal)
+    followed: Signal[[History]] = field(default_factory=Signal)  # also so far, while flights are identified
+    began: Signal[[list[Flight], int]] = field(default_factory=Signal)  # too few so far to follow, of how many in all
     left_out: Signal[[]] = field(default_factory=Signal)  # what cannot be used has changed
     kept: Signal[[Path]] = field(default_factory=Signal)  # a report or a recording is written
 
@@ -271,9 +272,12 @@ class Following:
         told: list[str] = []
 
         def work(run: Run) -> None:
+            if todo and self.history is None:
+                self.events.began([], len(paths))
             try:
                 for place, path in enumerate(todo):
                     self._take(path, place, len(todo), run)
+                    self._show_so_far(path, len(paths))
             except Stopped:
                 told.append(f"Stopped after {len(self._flights)} of {len(paths)} flights; Track goes on from there.")
             self._follow(run, _FOLLOWING if todo else 1.0)
@@ -309,6 +313,21 @@ class Following:
             return
         self._flights[path] = flight
 
+    def _show_so_far(self, path: Path, count: int) -> None:
+        """What is known after this flight, unless later ones were identified before; count: flights in all."""
+        known = in_order(self._flights)
+        if path not in known[-1:]:
+            return
+        flights = [self._flights[one] for one in known]
+        growing = self._unit_so_far()
+        for _ in growing.follow(flights):
+            pass
+        if growing.last is None:
+            self.events.began(flights, count)
+            return
+        self.history = growing.copy()
+        self.events.followed(self.history)
+
     def _follow(self, run: Run, share: float) -> None:
         """Looks after each flight, of all that are identified; share: of the bar."""
         self._grow([self._flights[path] for path in in_order(self._flights)], run, share)
@@ -325,13 +344,17 @@ class Following:
         return [why for name, why in left_out.items() if path is None or (path / name).exists()]
 
     def _grow(self, flights: list[Flight], run: Run, share: float) -> None:
-        if self._growing is None or self._growing.thresholds != self.thresholds:
-            self._growing = History(self.thresholds)
-        for done in self._growing.follow(flights):
+        growing = self._unit_so_far()
+        for done in growing.follow(flights):
             run.say(f"after flight {done}", 1.0 - share * (1.0 - done / len(flights)))
-        self.history = self._growing.copy()
+        self.history = growing.copy()
         if self.last is not None:
             self.provenance.take(self._inputs(None if self._path is None else dict(self._versions)))
+
+    def _unit_so_far(self) -> History:
+        if self._growing is None or self._growing.thresholds != self.thresholds:
+            self._growing = History(self.thresholds)
+        return self._growing
 
     # --- what arrives -----------------------------------------------------------------------------------------------
 

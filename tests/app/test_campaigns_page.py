@@ -15,7 +15,7 @@ from ema_model.campaign.plan_axes import inputs_of
 from ema_model.campaign.rows import common
 from ema_model.campaign.store import Store, header_of
 from ema_model.errors import InputError
-from emaviz.page.campaigns import label, tables
+from emaviz.page.campaigns import figures, label, progress_bars, tables
 from emaviz.recording import read
 from emaviz.session.campaigns import Campaigns
 from emaviz.session.data_folder import DataFolder
@@ -116,7 +116,12 @@ def test_what_the_list_says_of_a_row(data):
     (row,) = store.table("compare").to_pylist()
     assert label(row | {"adequate": False, "variable": "load"}, 1) == "1 · load · seed 1"
     shown = tables(store)
-    assert "A worn one" in shown and "<td>worn</td>" in shown and "Comparison" in shown
+    assert "A worn one" in progress_bars(store) and "1 of 1" in progress_bars(store)
+    assert [figure.layout.title.text for figure in figures(store)] == [
+        "<b>Error of the identified k</b>",
+        "<b>What explains the residual first</b>",
+    ]
+    assert "<td>worn</td>" in shown and "Comparison" in shown
 
 
 @pytest.mark.long

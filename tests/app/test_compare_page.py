@@ -11,7 +11,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from support.comparison_by_hand import comparison as by_hand
-from support.on_page import choose, field, fill, wait_until
+from support.on_page import choose, field, wait_until
 from support.two_clocks import write_two_clocks
 
 from ema_model.actuator import load_actuator
@@ -111,11 +111,18 @@ def number_box(page, label):
     return float(row.locator("input:not([type=hidden])").first.input_value())
 
 
+def in_the_table(page, column):
+    """What the import table has of a column: quantity, unit, sign, delay."""
+    row = page.locator(".emaviz-map tr").filter(has=page.get_by_text(column, exact=True)).first
+    fields = row.locator("[data-do=signal], [data-do=unit], [data-do=sign], [data-do=late]")
+    return [one.inner_text() if one.get_attribute("data-do") == "sign" else one.input_value() for one in fields.all()]
+
+
 def test_from_a_file_to_the_region_where_the_model_fails(compare, app, rig_file):
     page = compare
     upload(page, rig_file)
-    page.get_by_text("← iq [mA]").wait_for()
-    page.get_by_text("channel_7:").wait_for()
+    wait_until(lambda: in_the_table(page, "iq [mA]") == ["current_A", "mA", "+", "0"])
+    assert in_the_table(page, "channel_7") == [""]
     wait_until(lambda: len(figures(page)) >= 1)  # the preview
     name = next(iter(app.comparing.opened))
     assert "<" not in name and app.comparing.opened[name].measurement is None
@@ -195,15 +202,16 @@ def test_a_delay_is_said_and_stays_where_another_thing_is_edited(compare, app, r
     page.get_by_text("The motor speed comes").wait_for()
     name = next(iter(app.comparing.opened))
     page.get_by_role("button", name="Columns…").click()
-    choose(page, "Column", "motor_speed_rad_s")
-    fill(page, "Late by [ms]", "5")
-    page.get_by_text("← motor_speed_rad_s, 5 ms late").wait_for()
-    page.get_by_label("Sign turned", exact=True).click()
-    page.get_by_text("← motor_speed_rad_s × −1, 5 ms late").wait_for()
-    page.get_by_label("Sign turned", exact=True).click()
-    choose(page, "Column", "current_A")
-    choose(page, "Column", "motor_speed_rad_s")
-    wait_until(lambda: number_box(page, "Late by [ms]") == 5.0)
+    late, sign = (
+        page.get_by_label(f"{start}motor_speed_rad_s{end}") for start, end in (("", " is late by"), ("Sign of ", ""))
+    )
+    late.fill("5")
+    late.press("Enter")
+    wait_until(lambda: in_the_table(page, "motor_speed_rad_s") == ["motor_speed_rad_s", "rad/s", "+", "5"])
+    sign.click()
+    wait_until(lambda: in_the_table(page, "motor_speed_rad_s")[2:] == ["−", "5"])
+    sign.click()
+    wait_until(lambda: in_the_table(page, "motor_speed_rad_s")[2:] == ["+", "5"])
     page.get_by_role("button", name="Use these columns").click()
     page.get_by_text("No delay is seen between motor position and motor speed").wait_for(state="attached")
     entry = app.comparing.opened[name].measurement.reading.mapping.get("motor_speed_rad_s")
@@ -214,17 +222,11 @@ def test_a_delay_is_said_and_stays_where_another_thing_is_edited(compare, app, r
 def test_a_column_is_corrected_by_hand(compare, app, rig_file, tmp_path):
     page = compare
     upload(page, shutil.copy(rig_file, tmp_path / "another.csv"))  # a browser tells no change where it is the same
-    page.get_by_text("← iq [mA]").wait_for()
+    page.get_by_label("Sign of iq [mA]").click()
+    wait_until(lambda: in_the_table(page, "iq [mA]") == ["current_A", "mA", "−", "0"])
     name = next(iter(app.comparing.opened))
-    page.get_by_label("Column", exact=True).click()
-    page.get_by_role("option", name="iq [mA]", exact=True).click()
-    page.get_by_label("Sign turned", exact=True).click()
-    page.get_by_text("← iq [mA] × −1").wait_for()
-    page.get_by_label("Column", exact=True).click()
-    page.get_by_role("option", name="channel_7", exact=True).click()
-    page.get_by_label("is", exact=True).click()
-    page.get_by_role("option", name="Temperature [°C]", exact=True).click()
-    page.get_by_text("← channel_7").wait_for()
+    page.get_by_label("What channel_7 is").select_option("temperature_C")
+    wait_until(lambda: in_the_table(page, "channel_7")[0] == "temperature_C")
     page.get_by_role("button", name="Use these columns").click()
     wait_until(lambda: app.comparing.opened[name].measurement is not None)
     measurement = app.comparing.opened[name].measurement
@@ -249,16 +251,16 @@ def test_a_header_found_wrongly_is_clicked(compare, app, recording, tmp_path):
     name = "uploads/coded.csv"
     assert list(app.comparing.opened[name].columns) == ["K1", "K2", "K3", "K4"]
 
-    choose(page, "Header in line", "1")
+    choose(page, "Header line", "1")
     page.locator(".emaviz-beside").filter(has_text="line 1: no table begins there").wait_for()
-    wait_until(lambda: field(page, "Header in line").input_value() == "found by itself")
+    wait_until(lambda: field(page, "Header line").input_value() == "found by itself")
     page.get_by_role("button", name="4  t [ms];Soll <b> [°]").click()
     page.get_by_text("As said: header in line 4, Windows-1252.").wait_for()
     assert list(app.comparing.opened[name].columns) == list(columns)
     choose(page, "Encoding", "DOS 850")
     page.get_by_text("As said: header in line 4, DOS 850.").wait_for()
     choose(page, "Encoding", "found by itself")
-    page.get_by_text("← Strom iq [mA]").wait_for()
+    wait_until(lambda: in_the_table(page, "Strom iq [mA]")[:2] == ["current_A", "mA"])
 
     page.get_by_role("button", name="Use these columns").click()
     wait_until(lambda: app.comparing.comparison and app.comparing.comparison.recordings[0].name == "coded")

@@ -189,6 +189,7 @@ def test_flights_that_were_removed_or_replaced_are_not_followed_on(app, monkeypa
 
     monkeypatch.setattr("emaviz.session.track.identified", identified)
     monkeypatch.setattr(track, "_follow", lambda *_: None)
+    monkeypatch.setattr(track, "_show_so_far", lambda *_: None)
     monkeypatch.setattr("emaviz.session.track.check_enough", lambda *_: None)
     folder = app.data.folder / "flights"
     folder.mkdir()

@@ -7,7 +7,7 @@ import threading
 from support.on_page import wait_until
 
 from ema_model.errors import InputError
-from emaviz.session.jobs import Job, Pace, Worker
+from emaviz.session.jobs import Job, Pace, Waiting, Worker
 
 
 class Heard:
@@ -181,3 +181,42 @@ def test_what_waits_for_its_turn_says_for_what_and_lets_what_a_person_asks_for_g
     wait_until(lambda: first.begin("Comparing", lambda tell: order.append("compared")))
     wait_until(lambda: len(order) == 2)
     assert order == ["compared", "restored"] and not waits.waiting
+
+
+def test_runs_that_wait_begin_in_their_order_one_after_another(worker):
+    jobs, order, go_on = worker.jobs, [], threading.Event()
+    first = Job(worker)
+
+    def long(tell):
+        while not go_on.wait(0.01):
+            tell("on", 0.5)
+
+    assert first.begin("First", long)
+    wait_until(lambda: jobs.running is not None and jobs.running.share == 0.5)
+    own = {name: Job(worker) for name in ("second", "third", "fourth")}
+    lines = {
+        name: Waiting(name, lambda name=name: own[name].begin(name, lambda tell: order.append(name))) for name in own
+    }
+    for one in lines.values():
+        jobs.add(one)
+    again = Waiting("second, another", lambda: own["second"].begin("second", lambda tell: order.append("another")))
+    jobs.add(again, lines["second"])
+    assert [one.title for one in jobs.waiting] == ["second, another", "third", "fourth"], "it keeps its place"
+    jobs.remove(lines["third"])
+    go_on.set()
+    wait_until(lambda: len(order) == 2)
+    assert order == ["another", "fourth"] and not jobs.waiting
+    wait_until(lambda: jobs.running is None)
+    assert jobs.ended is not None and (jobs.ended.job, jobs.ended.stopped) == (own["fourth"], False)
+
+
+def test_one_that_cannot_begin_waits_no_more_and_lets_the_next_go(worker, errors):
+    done = threading.Event()
+
+    def refused():
+        raise InputError("its folder is gone")
+
+    worker.jobs.add(Waiting("Refused", refused))
+    worker.jobs.add(Waiting("Next", lambda: done.set() or True))
+    assert done.wait(5.0) and [str(one) for one in errors] == ["its folder is gone"]
+    wait_until(lambda: not worker.jobs.waiting)

@@ -1,4 +1,4 @@
-"""Library on the page: what its long run is refused for stands beside its button."""
+"""Library on the page: that its long run waits in line stands beside its button."""
 
 from __future__ import annotations
 
@@ -20,11 +20,14 @@ def test_an_effect_is_drawn_against_what_it_follows(shared_page, app):
         assert picture.locator("path[stroke='#e03131']").get_attribute("d").count("M") > 100
 
 
-def test_pictures_that_must_wait_are_told_beside_their_button(shared_page, app, monkeypatch):
+def test_pictures_that_wait_in_line_are_told_beside_their_button(shared_page, app, monkeypatch):
     page = shared_page
     page.get_by_role("tab", name="Library", exact=True).click()
     button = page.get_by_role("button", name="Simulate all for their thumbnails")
     wait_until(lambda: button.is_visible() and not app.session.worker.busy, 60.0)
-    monkeypatch.setattr(app.tab(LibraryTab)._library, "draw_all", lambda: False)  # as while a search goes on
+    free = []
+    monkeypatch.setattr(app.tab(LibraryTab)._library, "draw_all", lambda: bool(free))  # none, while another goes on
     button.click()
-    page.locator(".emaviz-beside").filter(has_text="Another long run goes on; stop it first.").wait_for()
+    page.locator(".emaviz-beside").filter(has_text="In line: begins after the run before").wait_for()
+    free.append(True)
+    page.locator(".emaviz-beside").wait_for(state="detached")

@@ -25,7 +25,7 @@ from emaviz.figures import comparison as comparison_figures
 from emaviz.figures.lines import Lines, Window, clipped
 from emaviz.figures.theme import why_missing
 from emaviz.page.compare import WORKSPACE
-from emaviz.page.compare.files import RawLines
+from emaviz.page.compare.columns import MappingStep
 from emaviz.page.measure import hint, marked
 from emaviz.page.panel import Cleared
 from emaviz.page.playback import PlaybackStrip
@@ -300,16 +300,16 @@ _STEPS = (
 class ResultPanel:
     """Everything here is built and changed on the screen's thread.
 
-    strip: its clock, for Compare's recording on the 3D actuator; lines(): adds a text's first lines, above the preview;
-    leads(): adds what may follow, below the plots, where it is seen however much is answered; keep(): adds what saves
-    a comparison, below it.
+    strip: its clock, for Compare's recording on the 3D actuator; step(preview): adds what a file's columns are, above
+    the preview; leads(): adds what may follow, below the plots, where it is seen however much is answered; keep(): adds
+    what saves a comparison, below it.
     """
 
     def __init__(
         self,
         page: Page,
         strip: PlaybackStrip,
-        lines: Callable[[], RawLines],
+        step: Callable[[Callable[[Opened, str], None]], MappingStep],
         leads: Callable[[], object],
         keep: Callable[[], Cleared],
     ) -> None:
@@ -318,7 +318,7 @@ class ResultPanel:
         self._comparison: Comparison | None = None
         self._time_s = 0.0  # where the clock stood when the plots were drawn last
         self._region: Region | None = None
-        self._preview: Any = None
+        self.wanted: int | None = None  # the place of the region that is chosen once there is a comparison
         self._mapped: list[Lines] = []  # what the preview draws
         self._buttons: list[Any] = []
         gui = page.server.gui
@@ -326,10 +326,12 @@ class ResultPanel:
         self._headline = add_html(gui, begin("Nothing is compared yet", _STEPS))
         add_html(gui, PLOTS_EARLY)
         self._numbers = add_html(gui, visible=False)
-        self._place = gui.add_folder("Preview of the columns", visible=False)
+        self._place = gui.add_folder("The file's columns", visible=False)
         with self._place:
             add_html(gui, ALL_COLUMNS)
-            self._lines = lines()
+            self.step = step(self.preview)
+            self._preview: Any = gui.add_plotly(go.Figure(), config=_CONFIG, visible=False)
+            self.step.add_lines()
         self._answer = gui.add_folder("Where the model fails", visible=False)
         with self._answer:
             self._hint = add_html(gui)
@@ -355,18 +357,19 @@ class ResultPanel:
 
     # --- before a comparison ----------------------------------------------------------------------------------------
 
-    def preview(self, opened: Opened) -> None:
-        """The lines of a text, and the signals of a file as they are mapped now."""
-        said = "as its columns are read"
-        self._lines.show(opened)
+    def preview(self, opened: Opened, plotted: str = "") -> None:
+        """The signals of a file as they are mapped now, below one of its columns, if any, as it stands there."""
+        said, self._mapped = "as its columns are read", []
+        if plotted in opened.columns:
+            self._mapped.append(comparison_figures.raw_column(opened.columns, opened.mapping, plotted))
         try:
-            self._mapped = comparison_figures.mapped_lines(opened.columns, opened.mapping)
+            self._mapped += comparison_figures.mapped_lines(opened.columns, opened.mapping)
         except InputError as error:
             said = "no table is found in it" if opened.problem else str(error)
-            if self._preview is not None:
-                self._preview.visible = False
-        else:
+        if self._mapped:
             self._draw_preview(None)
+        else:
+            self._preview.visible = False
         self._headline.content = html("<div {}><b>{}</b>, {}</div>", _BOX, opened.path.name, said)
         self._place.visible = True
         self._show_answer(False)
@@ -376,9 +379,6 @@ class ResultPanel:
         over_time = self._mapped[0].time == "Time [s]" and bool(np.all(np.diff(times) > 0.0))  # which NaN is not
         window_s = clipped(window_s, times) if over_time else None
         figure, aspect = comparison_figures.mapped_columns(self._mapped, window_s)
-        if self._preview is None:
-            with self._place:
-                self._preview = self._page.server.gui.add_plotly(figure, config=_CONFIG, aspect=aspect)
         if over_time:
             rows = len(self._mapped)
             self._page.measuring.add_rows(self._preview, rows, self._mapped_at, self._draw_preview)
@@ -430,6 +430,15 @@ class ResultPanel:
             self._kept.clear()
         self._put(0)
         self._plots.begin(View(comparison))
+        if self.wanted is not None:
+            self.select(self.wanted)
+            self.wanted = None
+
+    @property
+    def selected(self) -> int | None:
+        """The place of the chosen region in the list; None for none."""
+        regions = self._comparison.worst_regions if self._comparison is not None else []
+        return next((i for i, one in enumerate(regions) if one is self._region), None)
 
     def select(self, index: int) -> None:
         """Highlights a region in every plot, and moves the play-head and the actuator to its worst moment."""

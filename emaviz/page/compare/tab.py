@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -19,9 +19,11 @@ from ema_model.recordings import SIGNALS
 from ema_model.recordings.formats import FORMATS
 from ema_model.text import COLOURS
 from emaviz.page.compare import WORKSPACE
-from emaviz.page.compare.files import MappingStep, RawLines, health_card, recordings_list
+from emaviz.page.compare.columns import MappingStep
+from emaviz.page.compare.files import health_card, recordings_list
 from emaviz.page.compare.result import ResultPanel
 from emaviz.page.panel import RECORD, REPORT, JobLine, KeepButtons, Lead, Leads
+from emaviz.page.share import Place
 from emaviz.page.style import LONG_LABELS
 from emaviz.page.tab import Shared, Standing, Tab
 from emaviz.page.workspaces import Page
@@ -363,9 +365,9 @@ class ComparePanel:
             self._which = gui.add_dropdown("Shown", [_NONE], visible=False)
             self._columns = gui.add_button("Columns…", icon=viser.Icon.TABLE, color="gray", visible=False)
             self._remove = gui.add_button("Remove", icon=viser.Icon.X, color="gray", visible=False)
-        self._mapping = MappingStep(page, comparing, result.preview)
+        self._mapping = result.step
         self._start = gui.add_button("Compare", icon=viser.Icon.ARROWS_DIFF)
-        self._line = JobLine(page, comparing.job)
+        self._line = JobLine(page, comparing.job, WORKSPACE)
         self._health_folder = gui.add_folder("Data health", visible=False)
         with self._health_folder:
             self._health = add_html(gui)
@@ -518,7 +520,7 @@ class CompareTab(Tab):
             self.result = ResultPanel(
                 self.page,
                 shared.strip,
-                lambda: RawLines(self.page, shared.comparing),
+                lambda preview: MappingStep(self.page, shared.comparing, preview),
                 lambda: leads(self.page, shared.discovering),
                 lambda: KeepControls(self.page, shared.comparing, shared.viewer),
             )
@@ -530,6 +532,35 @@ class CompareTab(Tab):
     def refresh_files(self) -> None:
         """What may be added."""
         self.panel.refresh_files()
+
+    def place(self) -> Place:
+        """The measurements, the actuator where it is not the app's, and the chosen region."""
+        comparing, region = self.shared.comparing, self.result.selected
+        found: dict[str, Sequence[str]] = {"file": list(comparing.opened)}
+        if comparing.actuator_name != comparing.session.actuator.name:
+            found["actuator"] = [comparing.actuator_name]
+        return found if region is None else {**found, "region": [f"{region + 1}"]}
+
+    def go_to(self, place: Place) -> None:
+        """Opens the measurements, which are compared, unless that is done; then chooses the region."""
+        comparing, files = self.shared.comparing, list(place.get("file", ()))
+        region = next((int(one) - 1 for one in place.get("region", ()) if one.isdecimal()), None)
+        name = next(iter(place.get("actuator", ())), comparing.session.actuator.name)
+        for one in files:
+            comparing.folder.measurement(one)  # all of them, before what is open gives way
+        if files and (files != list(comparing.opened) or name != comparing.actuator_name):
+            comparing.choose_actuator(name)
+            self.panel.asked.show_settings()
+            self.result.wanted = region
+            for one in [one for one in comparing.opened if one not in files]:
+                comparing.remove(one)
+            for one in files:
+                comparing.add(one)
+        elif region is not None and comparing.comparison is not None:
+            if region != self.result.selected:
+                self.result.select(region)
+        else:
+            self.result.wanted = region
 
     def kept(self) -> dict[str, Part]:
         """What is opened and asked."""

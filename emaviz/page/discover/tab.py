@@ -15,7 +15,7 @@ from ema_model.discovery.result import Experiment
 from ema_model.discovery.snapshot import Look
 from ema_model.discovery.words import effect_title, rung_title
 from ema_model.effects import CATALOGUE
-from ema_model.errors import InputError
+from ema_model.errors import InputError, quoted
 from ema_model.faults import CAUSES
 from ema_model.quantities.numbers import number
 from emaviz.page.discover import WORKSPACE, candidate
@@ -23,6 +23,7 @@ from emaviz.page.discover.candidate import OwnEffect
 from emaviz.page.discover.result import HOME, DiscoveryPanel
 from emaviz.page.explore.tab import ExploreTab, take_experiment
 from emaviz.page.panel import JobLine, KeepButtons, Keeps, Lead, Leads
+from emaviz.page.share import Place
 from emaviz.page.tab import Shared, Standing, Tab
 from emaviz.page.workspaces import Page
 from emaviz.recording.viewer import ViewerHost
@@ -399,7 +400,7 @@ class DiscoverPanel:
             visible=False,
             hint="Adds, step by step, every effect and fault that the data support",
         )
-        self._line = JobLine(page, discovering.job)
+        self._line = JobLine(page, discovering.job, WORKSPACE)
         self._cards_folder = gui.add_folder("What may be missing", visible=False)
         with self._cards_folder:
             self._style = add_html(gui)
@@ -439,6 +440,10 @@ class DiscoverPanel:
 
     # --- what is asked ----------------------------------------------------------------------------------------------
 
+    def show_entries(self) -> None:
+        """Which discovery is shown; on the screen's thread."""
+        self._entries.show()
+
     def _chosen(self) -> None:
         """Another source is chosen; on the screen's thread."""
         self._opened = None
@@ -453,7 +458,7 @@ class DiscoverPanel:
         self._page.begins(begin, button)
 
     def _begin(self) -> None:
-        if not self._page.begins(self._discovering.start, self._start):
+        if not self._page.begins(self._discovering.start, self._start, "Discover"):
             self._discovering.provenance.refused()
 
     def _forget_errors(self) -> None:
@@ -619,6 +624,21 @@ class DiscoverTab(Tab):
         """Which recordings, the run, and the steps."""
         shared = self.shared
         self.panel = DiscoverPanel(self.page, shared.discovering, self.result, shared.uploads, self._standing)
+
+    def place(self) -> Place:
+        """The number of the discovery."""
+        entry = self.shared.discovering.entries.current
+        return {} if entry is None else {"discovery": [str(entry.number)]}
+
+    def go_to(self, place: Place) -> None:
+        """Shows it, as it was left."""
+        discovering = self.shared.discovering
+        for asked in place.get("discovery", ())[:1]:
+            entry = next((one for one in discovering.entries.all if str(one.number) == asked), None)
+            if entry is None:
+                raise InputError(f"there is no discovery {quoted(asked, 20)} here any more; load its session on Runs")
+            discovering.show(entry)
+            self.panel.show_entries()
 
     def kept(self) -> dict[str, Part]:
         """Every discovery, with the files that they need."""

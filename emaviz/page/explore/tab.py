@@ -327,7 +327,7 @@ class SealControls:
         self._button = gui.add_button(
             "Seal as a challenge…", icon=viser.Icon.LOCK, color="gray", hint="One file for a colleague to solve"
         )
-        JobLine(page, sealing.job)
+        JobLine(page, sealing.job, WORKSPACE)
         self._button.on_click(lambda event: self._ask(event.client))
         sealing.job.began.connect(lambda _: page.screen.post("sealing", lambda: self._busy(True)))
         sealing.job.ended.connect(lambda _: page.screen.post("sealing", lambda: self._busy(False)))

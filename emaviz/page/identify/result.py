@@ -166,7 +166,7 @@ class LandscapeView:
         )
         self._extent: Any = gui.add_dropdown("Shown", (_WHOLE, _CLOSE))
         self._draw = gui.add_button("Draw the landscape", icon=viser.Icon.MAP_2, disabled=True)
-        self._line = JobLine(page, self._landscapes.job, stop="Stop drawing")
+        self._line = JobLine(page, self._landscapes.job, WORKSPACE, stop="Stop drawing")
         self._first = add_html(gui, begin("No landscape yet", _LANDSCAPE_STEPS))
         self._show_controls(False)
         self._place = gui.add_folder("Map", visible=False)

@@ -9,7 +9,7 @@ from typing import Any
 import msgspec
 import viser
 
-from ema_model.errors import InputError
+from ema_model.errors import InputError, quoted
 from ema_model.identification.run import ALGORITHMS
 from ema_model.identification.words import facts, verdict, why_best
 from ema_model.recordings import write_measurement
@@ -18,8 +18,9 @@ from emaviz.figures.identification import Row, named
 from emaviz.page.explore.tab import ExploreTab, take_separating
 from emaviz.page.identify import WORKSPACE
 from emaviz.page.identify.result import IdentifyResult
-from emaviz.page.panel import JobLine, recording_link
+from emaviz.page.panel import RECORD, REPORT, JobLine, recording_link
 from emaviz.page.runs import RunsTab
+from emaviz.page.share import Place
 from emaviz.page.style import IN_PAIRS
 from emaviz.page.tab import Shared, Standing, Tab
 from emaviz.page.workspaces import Page
@@ -27,6 +28,7 @@ from emaviz.recording.viewer import ViewerHost
 from emaviz.session.compare import Comparing
 from emaviz.session.discover.discovering import Discovering
 from emaviz.session.identify import Race
+from emaviz.session.inputs import ResultFiles
 from emaviz.session.session_file import Part
 from emaviz.session.settings import SLIDERS, Settings, limits, taken
 from emaviz.text.html import Html, add_html, html, joined
@@ -76,7 +78,7 @@ class IdentifyPanel:
         ):
             self._listen(entry, partial(settings.set, name))
         self._start = gui.add_button("Identify", icon=viser.Icon.SEARCH)
-        self._line = JobLine(page, page.session.identifying.job, pauses="the search")
+        self._line = JobLine(page, page.session.identifying.job, WORKSPACE, pauses="the search")
         self._line.say("Finds the faults from the current alone.")
         self._text = add_html(gui)
         self._link = add_html(gui)
@@ -265,7 +267,14 @@ class IdentifyTab(Tab):
 
     def __init__(self, shared: Shared, right: viser.PanelHandle) -> None:
         super().__init__(shared, right)
-        self._standing = self.standing(self.page.session.identifying.provenance)
+        identifying, worker = self.page.session.identifying, self.page.session.worker
+        provenance = identifying.provenance
+        self._standing = self.standing(provenance)
+
+        def write(suffix: str) -> None:
+            worker.post(f"identify {suffix}", lambda: files.came(identifying.keep(suffix)))
+
+        files = provenance.files = ResultFiles((REPORT.suffix, RECORD.suffix), lambda: provenance.of, write)
         self.result = IdentifyResult(
             self.page,
             shared.slow_screen,
@@ -287,6 +296,17 @@ class IdentifyTab(Tab):
             open_viewer=lambda url, name: shared.tab(RunsTab).follow(url, name),
             to_discover=partial(take_to_discover, self.page, shared.discovering),
         )
+
+    def place(self) -> Place:
+        """The recording of the answer."""
+        race = self.page.session.identifying.race
+        return {} if race is None or race.path is None else {"run": [race.path.name]}
+
+    def go_to(self, place: Place) -> None:
+        """The answer, while it is here."""
+        for run in place.get("run", ())[:1]:
+            if [run] != self.place().get("run"):
+                raise InputError(f"this answer is not shown any more; its recording is on Runs: {quoted(run, 100)}")
 
     def show_settings(self) -> None:
         """Of the search."""

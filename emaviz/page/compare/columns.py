@@ -1,0 +1,378 @@
+"""Import: every column of a file in one table, drawn as it stands there, with what it is, its unit, sign and delay."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+from itertools import pairwise
+from typing import Any
+
+import msgspec
+import numpy as np
+import viser
+
+from ema_model.errors import InputError
+from ema_model.quantities.unit_conversion import known_units
+from ema_model.recordings import SIGNALS, ColumnMapping, MappedColumn
+from ema_model.recordings.column_mapping import WITHOUT_DELAY, unit_in_name
+from ema_model.text import COLOURS
+from emaviz.page.compare.files import LayoutControls, RawLines
+from emaviz.page.style import unseen_field
+from emaviz.page.window_layout import TWO_COLUMNS_PX
+from emaviz.page.workspaces import Page
+from emaviz.server.viser_private import Inside, id_of
+from emaviz.session.compare import Comparing
+from emaviz.session.files import Array, Opened
+from emaviz.text.html import Html, add_html, html, joined, unescaped
+
+# --- the table: a row a column, which is edited where it stands -------------------------------------------------------
+# One piece of HTML: a hundred columns with four of viser's controls each would take the page seconds.  Its fields tell
+# what is edited through an unseen field, and are drawn anew from the mapping.
+
+_MOST_COLUMNS = 200
+_WIDE_PX, _HIGH_PX, _BINS = 220, 34, 110  # of a column's drawing, and how many parts it has, each from min to max
+_SURE, _UNSURE = 0.8, 0.6
+_BETWEEN = "|"  # after it stands the time, so that the same edit twice is another text
+_SCRIPT = """
+(() => {
+  window.emavizColumns?.abort();
+  const heard = window.emavizColumns = new AbortController(), on = { capture: true, signal: heard.signal };
+  const clicked = ['plot', 'sign'];
+  const act = (event) => {
+    const at = event.target.closest?.('.emaviz-map [data-do]');
+    if (!at || clicked.includes(at.dataset.do) !== (event.type === 'click')) return;
+    const row = document.querySelector('label[for="FIELD"]')?.closest('.mantine-Flex-root');
+    const input = row?.querySelector('input'), column = at.closest('tr').dataset.column;
+    if (!input) return;
+    const said = { table: +at.closest('.emaviz-map').dataset.table, column: +column, what: at.dataset.do,
+                   value: at.value ?? '' };
+    const text = JSON.stringify(said) + 'BETWEEN' + Date.now();
+    Object.getOwnPropertyDescriptor(HTMLInputElement.prototype, 'value').set.call(input, text);
+    input.dispatchEvent(new Event('input', { bubbles: true }));
+    if (said.what === 'plot' && !at.closest('.drawn'))  // it is drawn below, and may be out of sight
+      setTimeout(() => [...document.querySelectorAll('.js-plotly-plot')].find(one => one.checkVisibility())
+        ?.scrollIntoView({ block: 'nearest', behavior: 'smooth' }), 600);
+    if (event.type !== 'click')  // the keyboard stays where it was, though the table is drawn anew
+      setTimeout(() => document.querySelector(`.emaviz-map tr[data-column="${column}"] [data-do=${said.what}]`)
+        ?.focus({ preventScroll: true }), 400);
+  };
+  document.addEventListener('change', act, on);
+  document.addEventListener('click', act, on);
+})();
+"""
+_STYLE = unescaped(
+    "<style>.emaviz-map{width:100%;border-collapse:collapse;font-size:12.5px;line-height:1.3}"
+    ".emaviz-map th{text-align:left;font-weight:400;opacity:.65;padding:2px 8px}"
+    ".emaviz-map td{padding:3px 8px;border-top:1px solid rgba(134,142,150,.3);overflow-wrap:anywhere}"
+    ".emaviz-map .aside td:not(:nth-child(3)){opacity:.6}"
+    ".emaviz-map :is(select,input){font:inherit;color:inherit;background:var(--mantine-color-body);height:26px;"
+    "border:1px solid rgba(134,142,150,.6);border-radius:4px;padding:0 4px;max-width:100%}"
+    ".emaviz-map input{width:64px}"
+    ".emaviz-map button{font:inherit;color:inherit;background:none;border:1px solid rgba(134,142,150,.6);"
+    "border-radius:4px;height:26px;min-width:32px;cursor:pointer}"
+    ".emaviz-map [data-do=plot]{padding:0;border:0;height:34px;width:220px;text-align:left;color:#2f6fde}"
+    f"@media(max-width:{TWO_COLUMNS_PX - 1}px){{.emaviz-map .why{{display:none}}"
+    ".emaviz-map [data-do=plot]{width:120px}.emaviz-map :is(td,th){padding-left:5px;padding-right:5px}}"
+    ".emaviz-map .drawn [data-do=plot]{outline:2px solid #2f6fde;outline-offset:2px}"
+    ".emaviz-map svg{display:block}.emaviz-map small{opacity:.75;white-space:nowrap}</style>"
+)
+
+
+class Edit(msgspec.Struct, frozen=True):
+    """What somebody did in the table."""
+
+    table: int  # that was shown then
+    column: int
+    what: str  # plot, signal, unit, sign, late
+    value: str = ""
+
+
+class ColumnTable:
+    """edited(edit): called on the screen's thread with what was done in the table that is shown."""
+
+    def __init__(self, page: Page, edited: Callable[[Edit], None], beside: Callable[[], Any]) -> None:
+        """beside(): the control beside which it is said what is refused."""
+        gui = page.server.gui
+        self.piece = add_html(gui, visible=False)
+        self.number = 0  # of the file that is shown
+        self._drawn: tuple[dict[str, Array] | None, list[Html]] = None, []
+        field: Any = gui.add_text("Column edited", "")
+        add_html(gui, unseen_field(id_of(field)))
+
+        def told(event: viser.GuiEvent[Any]) -> None:
+            text = str(field.value)
+            if event.client is not None and text:
+                said = text.rpartition(_BETWEEN)[0]
+                page.ask(f"mapping {text}", lambda: edited(_read(said)), beside())
+
+        field.on_update(told)
+        Inside(page.server).run(_SCRIPT.replace("FIELD", id_of(field)).replace("BETWEEN", _BETWEEN))
+
+    def show(self, opened: Opened, plotted: str) -> None:
+        """The columns of a file; plotted: the one that is drawn large below."""
+        if opened.columns is not self._drawn[0]:
+            self.number += 1
+            self._drawn = opened.columns, [drawing(values) for values in list(opened.columns.values())[:_MOST_COLUMNS]]
+        self.piece.content = table(opened, self.number, self._drawn[1], plotted)
+        self.piece.visible = bool(opened.columns)
+
+
+def _read(text: str) -> Edit:
+    try:
+        return msgspec.json.decode(text, type=Edit)
+    except msgspec.DecodeError:
+        raise InputError("the page said nothing that this table knows; load it again") from None
+
+
+def table(opened: Opened, number: int, drawings: list[Html], plotted: str) -> Html:
+    """A row a column, in the file's order."""
+    by_column = {entry.column: entry for entry in opened.mapping.entries}
+    why = dict(opened.mapping.unmapped)
+    rows = [
+        _row(i, name, drawing, by_column.get(name), why.get(name, ""), name == plotted)
+        for i, (name, drawing) in enumerate(zip(opened.columns, drawings))
+    ]
+    heads = ("Column of the file", "Its numbers (click: large)", "Quantity", "Unit in the file", "Sign")
+    head = joined(html("<th>{}</th>", one) for one in (*heads, "Late by [ms]", "Sure"))
+    more = len(opened.columns) - len(rows)
+    left = html("<div>… and {} more columns, which are not shown</div>", more) if more > 0 else ""
+    return _STYLE + html(
+        '<div style="padding:0 6px 6px;overflow-x:auto"><table class="emaviz-map" data-table="{}">'
+        "<thead><tr>{}</tr></thead><tbody>{}</tbody></table>{}</div>",
+        number,
+        head,
+        joined(rows),
+        left,
+    )
+
+
+def _row(place: int, name: str, drawing: Html, entry: MappedColumn | None, why: str, plotted: bool) -> Html:
+    classes = " ".join(filter(None, ("aside" if entry is None else "", "drawn" if plotted else "")))
+    fields = _fields(entry)
+    return html(
+        '<tr data-column="{}" class="{}"><td><b>{}</b>{}</td><td>{}</td><td>{}</td><td>{}</td><td>{}</td><td>{}</td>'
+        "<td>{}</td></tr>",
+        place,
+        classes,
+        name,
+        "" if entry is None else html("<br><small>{}</small>", done(entry)) if done(entry) else "",
+        html('<button data-do="plot" title="Draws {} below">{}</button>', name, drawing),
+        _select("signal", _quantities(), "" if entry is None else entry.signal, f"What {name} is"),
+        *fields,
+        html('<span class="why" style="opacity:.8">{}</span>', why) if entry is None else _sure(entry),
+    )
+
+
+def _fields(entry: MappedColumn | None) -> tuple[Html, Html, Html]:
+    """Unit, sign and delay of a column that is used."""
+    if entry is None:
+        return Html("–"), Html(), Html()
+    units = {one: one for one in units_of(entry)}
+    unit = _select("unit", units, entry.unit or si(entry.signal), f"Unit of {entry.column} in the file")
+    sign = html(
+        '<button data-do="sign" title="Turns its sign" aria-label="Sign of {}">{}</button>',
+        entry.column,
+        "−" if entry.sign < 0 else "+",
+    )
+    if entry.signal in WITHOUT_DELAY:
+        return unit, sign, Html()
+    late = html(
+        '<input data-do="late" type="number" step="any" value="{}" aria-label="{} is late by, ms" '
+        'title="It is moved back by as much: a delay of its clock, or of its sensor">',
+        f"{1e3 * entry.delay_s:.9g}",
+        entry.column,
+    )
+    return unit, sign, late
+
+
+def _select(what: str, options: Mapping[str, str], chosen: str, label: str) -> Html:
+    made = joined(
+        html('<option value="{}"{}>{}</option>', value, Html(" selected") if value == chosen else "", title)
+        for value, title in options.items()
+    )
+    return html('<select data-do="{}" aria-label="{}">{}</select>', what, label, made)
+
+
+def _sure(entry: MappedColumn) -> Html:
+    """How sure it is that this is what the column is, and why."""
+    good, bad = entry.confidence >= _SURE, entry.confidence < _UNSURE
+    colour = COLOURS["good"] if good else COLOURS["warning"] if bad else "inherit"
+    share = f"{100.0 * entry.confidence:.0f} %"
+    said = '<b style="color:{}" title="{}">{}</b> <span class="why" style="opacity:.8">{}</span>'
+    return html(said, colour, entry.reason, share, entry.reason)
+
+
+def done(entry: MappedColumn) -> str:
+    """What is done to a column's numbers beside its unit, sign and delay."""
+    offset = f"{'+' if entry.offset > 0.0 else '−'} {abs(entry.offset):.6g}" if entry.offset else ""
+    return " ".join(filter(None, (f"× {entry.scale:.6g}".replace("-", "−") if entry.scale != 1.0 else "", offset)))
+
+
+def drawing(values: Array) -> Html:
+    """A column over its samples, as small as a line of text, and from where to where its numbers go."""
+    values = np.asarray(values, dtype=float)
+    good = np.isfinite(values)
+    if not good.any():
+        return html("<small>no number in it</small>")
+    low, high = float(values[good].min()), float(values[good].max())
+    edges = np.linspace(0, len(values), min(_BINS, len(values)) + 1).astype(int)
+    points: list[str] = []
+    for i, (first, last) in enumerate(pairwise(edges)):
+        part = values[first:last][good[first:last]]
+        x = (i + 0.5) / (len(edges) - 1) * _WIDE_PX
+        for y in dict.fromkeys((float(part.min()), float(part.max()))) if len(part) else ():
+            height = 0.5 if high == low else (y - low) / (high - low)
+            points.append(f"{x:.0f},{1 + (1.0 - height) * (_HIGH_PX - 14):.1f}")
+    look = 'fill="none" stroke="currentColor" stroke-width="1" vector-effect="non-scaling-stroke"'
+    line = f'<polyline points="{" ".join(points)}" {look}/>'
+    missing = "" if good.all() else f", {100.0 * float(np.mean(~good)):.3g} % missing"
+    text = f"{low:.4g} … {high:.4g}{missing}".replace("-", "−") if high > low else f"always {low:.4g}{missing}"
+    size = f'width="100%" height="{_HIGH_PX - 12}" viewBox="0 0 {_WIDE_PX} {_HIGH_PX - 12}" preserveAspectRatio="none"'
+    svg = f'<svg {size} aria-hidden="true">{line}</svg>'
+    return unescaped(svg) + html("<small>{}</small>", text)
+
+
+def _quantities() -> dict[str, str]:
+    """Their titles, by signal; none first."""
+    return {"": "not used"} | {name: title(name) for name in SIGNALS}
+
+
+def title(signal: str) -> str:
+    """Of a quantity, with its SI unit; the linear ones have the rotary ones' titles."""
+    one = SIGNALS[signal]
+    return f"{one.title} [{one.unit}]" if one.unit else one.title
+
+
+def si(signal: str) -> str:
+    """Its SI unit."""
+    return SIGNALS[signal].unit or "–"
+
+
+def units_of(entry: MappedColumn) -> list[str]:
+    """The signal's own unit first, then those that are converted."""
+    own = si(entry.signal)
+    others = [name for name in known_units(SIGNALS[entry.signal].unit) if not replace(entry, unit=name).converter.is_si]
+    return list(dict.fromkeys([own, *([entry.unit] if entry.unit else []), *others]))
+
+
+# --- the import step: how the file is read, and what its columns are --------------------------------------------------
+
+
+class MappingStep:
+    """Stands across the whole width of Compare's panel.
+
+    preview(opened, plotted) draws the signals as mapped, and a column as it stands in the file; on the screen's thread.
+    """
+
+    def __init__(self, page: Page, comparing: Comparing, preview: Callable[[Opened, str], None]) -> None:
+        self._comparing, self._preview = comparing, preview
+        self._opened: Opened | None = None
+        self._plotted = ""
+        gui = page.server.gui
+        self._layout = LayoutControls(page, comparing)
+        with self._layout.folder:
+            self.use = gui.add_button("Use these columns", icon=viser.Icon.CHECK)
+        self._table = ColumnTable(page, self._edit, lambda: self.use)
+        self._lines: RawLines | None = None
+        self._page = page
+        self.use.on_click(lambda _: self._apply())
+        self.hide()
+
+    def add_lines(self) -> None:
+        """A text's first lines, at this place of the page."""
+        self._lines = RawLines(self._page, self._comparing)
+
+    @property
+    def header(self) -> Any:
+        """The control that says where a text's columns are named."""
+        return self._layout.header
+
+    @property
+    def mapping(self) -> ColumnMapping:
+        """As it stands now."""
+        return ColumnMapping() if self._opened is None else self._opened.mapping
+
+    def show(self, opened: Opened) -> None:
+        """Opens the step for a file; on the screen's thread."""
+        self._opened = opened
+        if self._plotted not in opened.columns:
+            self._plotted = ""
+        self._layout.show(opened)
+        if self._lines is not None:
+            self._lines.show(opened)
+        self.use.visible = bool(opened.columns)
+        self._draw()
+
+    def hide(self) -> None:
+        """Closes the step."""
+        self._opened, self._plotted = None, ""
+        self._layout.hide()
+        if self._lines is not None:
+            self._lines.hide()
+        self._table.piece.visible = False
+
+    def _edit(self, edit: Edit) -> None:
+        """What was done in the table, into the mapping."""
+        opened = self._opened
+        if opened is None or edit.table != self._table.number:
+            return  # of a file that gave way meanwhile
+        names = list(opened.columns)[:_MOST_COLUMNS]
+        if not 0 <= edit.column < len(names):
+            raise InputError("there is no such column; choose one of the table")
+        column = names[edit.column]
+        if edit.what == "plot":
+            self._plotted = "" if self._plotted == column else column
+        elif edit.what == "signal":
+            self._opened = replace(opened, mapping=self._with(column, edit.value))
+        else:
+            entry = next((one for one in opened.mapping.entries if one.column == column), None)
+            if entry is None:
+                raise InputError(f"{column}: say first what it is")
+            changed = _changed(entry, edit)
+            entries = tuple(changed if one is entry else one for one in opened.mapping.entries)
+            self._opened = replace(opened, mapping=replace(opened.mapping, entries=entries))
+        self._draw()
+
+    def _with(self, column: str, signal: str) -> ColumnMapping:
+        """The mapping with this column as that signal, or as none; who was it before is left aside."""
+        if signal and signal not in SIGNALS:
+            raise InputError("there is no such quantity; choose one of the list")
+        others = [one for one in self.mapping.entries if column != one.column and signal != one.signal]
+        given_up = [one.column for one in self.mapping.entries if one.signal == signal and one.column != column]
+        aside = dict(self.mapping.unmapped) | {name: "left aside by you" for name in given_up}
+        if signal:
+            aside.pop(column, None)
+            unit = unit_in_name(column, signal)
+            others.append(MappedColumn(signal, column, unit, reason="chosen by you"))
+        else:
+            aside[column] = "left aside by you"
+        order = list(SIGNALS)
+        return ColumnMapping(tuple(sorted(others, key=lambda one: order.index(one.signal))), tuple(aside.items()))
+
+    def _draw(self) -> None:
+        if self._opened is not None:
+            self._table.show(self._opened, self._plotted)
+            self._preview(self._opened, self._plotted)
+
+    def _apply(self) -> None:
+        if self._opened is not None:
+            self._comparing.use_mapping(self._opened.name, self.mapping)
+
+
+def _changed(entry: MappedColumn, edit: Edit) -> MappedColumn:
+    """An entry with another unit, sign or delay; InputError for a value that is none."""
+    chosen: dict[str, Any] = {"confidence": 1.0, "reason": "chosen by you", "rivals": ()}
+    if edit.what == "unit":
+        if edit.value not in units_of(entry):
+            raise InputError(f"{entry.column}: there is no such unit of it; choose one of the list")
+        return replace(entry, unit="" if edit.value == si(entry.signal) else edit.value, **chosen)
+    if edit.what == "sign":
+        return replace(entry, sign=-entry.sign, **chosen)
+    try:
+        late_ms = float(edit.value or 0.0)
+    except ValueError:
+        late_ms = math.nan
+    if edit.what != "late" or not math.isfinite(late_ms):
+        raise InputError(f"{entry.column}: late by how many ms? Give a number")
+    return replace(entry, delay_s=late_ms / 1e3, **chosen)

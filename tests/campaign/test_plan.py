@@ -58,6 +58,8 @@ def test_a_task_is_its_json_and_its_name_follows_from_all_of_it(tmp_path):
 
 def test_a_plan_written_out_is_the_same_plan(tmp_path):
     for name, path in shipped_plans().items():
+        if name.startswith("field_"):  # whose recordings are not shipped: test_data_sets.py
+            continue
         plan = load_plan(path)
         copy = tmp_path / f"{name}.toml"
         copy.write_text(plan.text, encoding="utf-8")

@@ -84,7 +84,7 @@ def _whole_paths(entry: Any, beside: Path) -> Any:
         return [_whole_paths(one, beside) for one in entry]
     if "each" in entry:  # the others lie in those folders
         return {**entry, "each": _whole_paths(entry["each"], beside)}
-    return {name: _whole_paths(one, beside) for name, one in entry.items()}
+    return {name: one if name == "label" else _whole_paths(one, beside) for name, one in entry.items()}
 
 
 def check_names(table: Mapping[str, Any], known: tuple[str, ...], where: str) -> None:

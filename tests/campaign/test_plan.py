@@ -214,7 +214,7 @@ WRONG = {
     "unknown entry": ("colour = 1\n" + GROUP, "has no 'colour'; it has schema"),
     "another schema": ("schema = 2\n" + GROUP, "schema 2 is not known"),
     "no toml": ("[groups", "not valid TOML"),
-    "unknown kind": ('[groups.g]\ndoes = "guess"\n', "does = 'guess' is not known; it is compare or"),
+    "unknown kind": ('[groups.g]\ndoes = "guess"\n', "does = 'guess' is not known; it is benchmark or compare or"),
     "unknown option": (GROUP + "colour = 1\n", "[groups.g] has no 'colour'; it has does"),
     "option of another kind": (GROUP + "most_effects = 1\n", "has no 'most_effects'"),
     "unknown run": (GROUP.replace("CHEAP", 'does = "identify"\nruns = "long"'), "no run 'long'; [runs] has short"),

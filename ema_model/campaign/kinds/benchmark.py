@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import time
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -22,6 +22,7 @@ from ema_model.discovery.discover import ENGINES
 from ema_model.errors import InputError, quoted
 from ema_model.models import ClosedLoop, InverseDynamics
 from ema_model.models.measured_motion import Stretch
+from ema_model.physics.jit import recursion
 from ema_model.recordings import Measurement, prepared
 
 Array = NDArray[np.float64]
@@ -48,7 +49,7 @@ def followed(recordings: Sequence[Measurement], actuator: Actuator) -> list[floa
 
 def simulated(inputs: TaskInputs, actuator: Actuator) -> Errors:
     """The rms error of the motor's position in open loop, mrad or mm; held-out ones with the fitted ones' offset."""
-    fitted, held = ([prepared(one, actuator) for one in every] for every in (inputs.fitted, inputs.held))
+    fitted, held = ([prepared(one, actuator) for one in every] for every in _both(inputs))
     found = in_open_loop(fitted, held, actuator)["motor_position_rad"]
     unseen = found.at_fitted_offset
     if unseen is None or found.fitted.reason or unseen.reason:
@@ -98,9 +99,7 @@ def columns_of(window: Stretch, linear: bool) -> dict[str, Array]:
 def regressed(inputs: TaskInputs) -> tuple[dict[str, float], Errors]:
     """Coefficients, and the errors in % of the measured rms."""
     actuator, linear = inputs.actuator, inputs.actuator.axes.motor == "linear"
-    models = [
-        InverseDynamics([prepared(one, actuator) for one in every], actuator) for every in (inputs.fitted, inputs.held)
-    ]
+    models = [InverseDynamics([prepared(one, actuator) for one in every], actuator) for every in _both(inputs)]
     columns = [[columns_of(window, linear) for window in model.windows] for model in models]
     names = list(columns[0][0])
     matrix = np.concatenate([np.column_stack([one[name] for name in names]) for one in columns[0]])
@@ -132,6 +131,63 @@ def _as_actuator(actuator: Actuator, found: Mapping[str, float], in_torque: bool
     )
 
 
+def regressed_servo(inputs: TaskInputs) -> tuple[dict[str, float], Errors]:
+    """The same of a position servo of which goal and position alone are known: its position error is what drives it.
+
+    Coefficients per rad of that error; the errors are of a simulation from the goal, mrad.
+    """
+    actuator = replace(inputs.actuator.without_controller(), leaves_out_reversals=False)
+    swapped = [[_driven_by_its_error(prepared(one, inputs.actuator)) for one in every] for every in _both(inputs)]
+    found, _ = regressed(TaskInputs(actuator, *swapped))
+    if not found["inertia"] > 0.0:
+        raise FloatingPointError("the regression finds no inertia, so that nothing can be simulated")
+    row = np.array([found[name] for name in ("inertia", "viscous", "coulomb", "sin", "cos", "offset")])
+    errors = []
+    for every in _both(inputs):
+        errors.append([])
+        for one in every:
+            goal, position, time = one["command_rad"], one["user_position_rad"], one.time_s
+            shown = [_servo(row, goal[run], position[run], time[run]) for run in one.runs]
+            measured = np.concatenate([position[run] for run in one.runs])
+            errors[-1].append(_MILLI * float(np.mean(np.abs(np.concatenate(shown) - measured))))
+    return found, (errors[0], errors[1])
+
+
+def _both(inputs: TaskInputs) -> tuple[list[Measurement], list[Measurement]]:
+    return inputs.fitted, inputs.held
+
+
+def _driven_by_its_error(one: Measurement) -> Measurement:
+    """Its position error in the current's place."""
+    signals = {name: one[name] for name in ("time_s", "segment") if name in one}
+    position = one["user_position_rad"]
+    driven = {"motor_position_rad": position, "current_A": one["command_rad"] - position}
+    return replace(Measurement({**signals, **driven}), name=one.name)
+
+
+@recursion
+def _servo(row, goal, measured, time):
+    """The position from the first sample on, at rest; the goal holds until the next sample."""
+    inertia, viscous, coulomb, sine, cosine, offset = row
+    shown = np.empty(goal.size)
+    q, dq = measured[0], 0.0
+    for i in range(goal.size):
+        shown[i] = q
+        if i + 1 == goal.size:
+            break
+        step = (time[i + 1] - time[i]) / _SERVO_STEPS
+        for _ in range(_SERVO_STEPS):
+            net = goal[i] - q - viscous * dq - sine * np.sin(q) - cosine * np.cos(q) - offset
+            halting = inertia / step * dq + net
+            net -= np.sign(halting) * min(abs(halting), max(0.0, coulomb))
+            dq += net / inertia * step
+            q += dq * step
+    return shown
+
+
+_SERVO_STEPS = 40  # of the simulation in a sample
+
+
 # --- one task: a method on recordings ---------------------------------------------------------------------------------
 
 _OURS, _REGRESSION = "discover", "least_squares"
@@ -157,8 +213,6 @@ class Settings:
                 raise InputError(f"no {name} {quoted(getattr(self, name))!r}; there are {', '.join(known)}")
         if self.method.startswith("bam_") and self.measure != "following":
             raise InputError('BAM\'s models follow a command: measure is "following"')
-        if self.method == _REGRESSION and self.measure == "following":
-            raise InputError('least squares gives a current or torque: measure is "torque" or "simulation"')
 
 
 def _run(inputs: TaskInputs, settings: Settings, seed: int) -> dict[str, Any]:
@@ -175,7 +229,7 @@ def _run(inputs: TaskInputs, settings: Settings, seed: int) -> dict[str, Any]:
         else:
             errors = simulated(inputs, model)
     elif settings.method == _REGRESSION:
-        found, errors = regressed(inputs)
+        found, errors = (regressed_servo if settings.measure == "following" else regressed)(inputs)
         answer = {"parameters": json.dumps(found), "answer_s": time.perf_counter() - began}
         if settings.measure == "simulation":
             in_torque = "current_A" not in inputs.fitted[0]
@@ -183,8 +237,7 @@ def _run(inputs: TaskInputs, settings: Settings, seed: int) -> dict[str, Any]:
     else:
         bench = bam.Bench(settings.mass_kg, settings.length_m, settings.supply_V)
         fitted, held = (
-            bam.Logs.of([prepared(one, inputs.actuator) for one in every], inputs.actuator)
-            for every in (inputs.fitted, inputs.held)
+            bam.Logs.of([prepared(one, inputs.actuator) for one in every], inputs.actuator) for every in _both(inputs)
         )
         name = settings.method.removeprefix("bam_")
         found = bam.fit(name, fitted, bench, seed, starts=settings.starts, evaluations=settings.evaluations)
@@ -235,6 +288,33 @@ def chosen(rows: Sequence[Mapping[str, Any]]) -> dict[str, Mapping[str, Any]]:
         told["by training error"] = min(others, key=lambda row: row["fitted_error"])
         told["in hindsight"] = min(others, key=lambda row: row["held_out_error"])
     return told
+
+
+def behind_first(groups: Mapping[str, Sequence[Mapping[str, Any]]]) -> dict[str, float]:
+    """Of each group our held-out error over that of the method which its training error chooses, the largest first."""
+    picked = {group: chosen(rows) for group, rows in groups.items()}
+    both = {group: one for group, one in picked.items() if {"ours", "by training error"} <= one.keys()}
+    ratios = {
+        group: one["ours"]["held_out_error"] / one["by training error"]["held_out_error"] for group, one in both.items()
+    }
+    return dict(sorted(ratios.items(), key=lambda one: -one[1]))
+
+
+def means(groups: Mapping[str, Sequence[Mapping[str, Any]]]) -> dict[str, float]:
+    """The mean held-out error over groups of each method, of the one that is chosen in each, and of the best in each.
+
+    Nothing where groups are held to different measures, or a method is not in all of them.
+    """
+    if len({row["measure"] for rows in groups.values() for row in rows}) != 1:
+        return {}
+    tables = [{row["method"]: row["held_out_error"] for row in rows} for rows in groups.values()]
+    shared = [name for name in tables[0] if all(name in one for one in tables)]
+    found = {name: float(np.mean([one[name] for one in tables])) for name in shared}
+    picked = [chosen(rows) for rows in groups.values()]
+    for name in ("by training error", "in hindsight"):
+        if all(name in one for one in picked):
+            found[name] = float(np.mean([one[name]["held_out_error"] for one in picked]))
+    return found
 
 
 def _told(rows: list[dict[str, Any]]) -> dict[str, Any]:

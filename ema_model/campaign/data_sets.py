@@ -150,7 +150,8 @@ def _xl330(files: Mapping[str, Path]) -> dict[str, Signals]:
 def _emps(files: Mapping[str, Path]) -> dict[str, Signals]:
     """Janot, Gautier, Brunot, Data set and reference models of EMPS, Nonlinear System Identification Benchmarks 2019.
 
-    The motor's force is g_τ times the controller's voltage `vir`: what every published simulation puts in.
+    What drives it is the controller's voltage `vir`, as in every published simulation.  It stands in the current's
+    place, since the amplifier makes a current of it, and the actuator's file has the force that a volt gives, g_τ.
     """
     found = {}
     for name, file in zip(("train", "test"), files.values()):
@@ -159,7 +160,7 @@ def _emps(files: Mapping[str, Path]) -> dict[str, Signals]:
             "time_s": columns["t"],
             "command_m": columns["qg"],
             "motor_position_m": columns["qm"],
-            "motor_force_N": _EMPS_N_V * columns["vir"],
+            "current_A": columns["vir"],
         }
     return found
 
@@ -214,7 +215,6 @@ def _hobby(files: Mapping[str, Path]) -> dict[str, Signals]:
     return found
 
 
-_EMPS_N_V = 35.15065188248547  # g_τ, which both of its files hold
 _CONTROLS = 3.0  # modes of the moteus controller from which on the motor is driven
 _HOBBY_S = 0.02  # sampling period
 _CONVERTERS: dict[str, Callable[[Mapping[str, Path]], dict[str, Signals]]] = {

@@ -98,7 +98,7 @@ def test_a_copy_becomes_recordings(name, tmp_path):
         assert np.max(np.abs(one["duty"])) <= 1.0
     elif name == "emps":
         assert list(columns) == ["train", "test"]
-        np.testing.assert_allclose(columns["test"]["motor_force_N"], 35.15065188248547 * (2.0 + TIME))
+        np.testing.assert_allclose(columns["test"]["current_A"], 2.0 + TIME)
     elif name == "ur10e":
         assert len(columns) == 10
         fitted, held = columns["joint_3_fit"], columns["joint_3_held"]

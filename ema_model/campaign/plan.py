@@ -14,6 +14,7 @@ import msgspec
 
 from ema_model.actuator import Actuator, actuator_text, parse_actuator, shipped
 from ema_model.campaign import plan_axes
+from ema_model.campaign.data_sets import folder_of
 from ema_model.campaign.kinds import KINDS
 from ema_model.campaign.plan_axes import AXES, MOST_TASKS, USUAL, Choice, check_count, choices_of, digest, run_of
 from ema_model.campaign.task import Excitation, File, Recorded, Simulated, Task
@@ -63,7 +64,8 @@ def plan_text(document: Mapping[str, Any], file: Path) -> str:
         if Path(table.get("actuator", "thesis")).suffix:
             table["actuator"] = str((file.parent / table["actuator"]).resolve())
         if "recordings" in table:
-            table["recordings"] = _whole_paths(table["recordings"], file.parent.resolve())
+            beside = folder_of(table.pop("data")) if "data" in table else file.parent
+            table["recordings"] = _whole_paths(table["recordings"], beside.resolve())
         groups[name] = table
     return toml_text({name: _at_the_top(one) for name, one in {**document, "groups": groups}.items()})
 
@@ -82,7 +84,7 @@ def _whole_paths(entry: Any, beside: Path) -> Any:
         return [_whole_paths(one, beside) for one in entry]
     if "each" in entry:  # the others lie in those folders
         return {**entry, "each": _whole_paths(entry["each"], beside)}
-    return {name: _whole_paths(one, beside) for name, one in entry.items()}
+    return {name: one if name == "label" else _whole_paths(one, beside) for name, one in entry.items()}
 
 
 def check_names(table: Mapping[str, Any], known: tuple[str, ...], where: str) -> None:
@@ -104,7 +106,7 @@ def table_of(document: Mapping[str, Any], name: str, where: str) -> dict[str, An
 
 _SHARED = ("does", "actuator", "seeds")
 _SIMULATED = ("runs", "holdout", "load_recorded", "noise_seed_plus", "tolerances_of", *AXES)
-_RECORDED = ("recordings", "mapping")
+_RECORDED = ("recordings", "data", "mapping")
 
 
 class Group:
@@ -120,6 +122,7 @@ class Group:
         source = source if self._kind.from_recordings else ()
         check_names(table, (*_SHARED, *source, *options), where)
         self._text, self._actuator = self._told("actuator", self._actuator_file)
+        self._recordings_in = self._told("data", lambda: folder_of(table["data"])) if "data" in table else beside
         self._seeds = self._told("seeds", lambda: _seeds(table.get("seeds", [0])))
         self._settings = self._told("", lambda: self._all_settings(options))
         if not self._kind.from_recordings:
@@ -201,8 +204,9 @@ class Group:
             if isinstance(entry, str):
                 sets = [([path], []) for path in self._files(entry)]
             elif isinstance(entry, dict):
-                check_names(entry, ("each", "fit", "holdout"), f"{self._where} recordings:")
-                folders = self._files(entry["each"]) if isinstance(entry.get("each"), str) else [self._beside]
+                check_names(entry, ("each", "fit", "holdout", "label"), f"{self._where} recordings:")
+                each = entry.get("each")
+                folders = self._files(each) if isinstance(each, str) else [self._recordings_in]
                 sets = [
                     tuple(self._all_files(entry.get(key, []), Path(folder)) for key in ("fit", "holdout"))
                     for folder in folders
@@ -212,7 +216,8 @@ class Group:
             for fit, holdout in sets:
                 if not fit:
                     raise InputError(f"{self._where} recordings: a task needs one to fit")
-                label = " + ".join(os.path.relpath(path, self._beside) for path in fit)
+                said = entry.get("label") if isinstance(entry, dict) else None
+                label = str(said or " + ".join(os.path.relpath(path, self._recordings_in) for path in fit))
                 source = Recorded(_digested(fit), _digested(holdout), tuple(mapping))
                 found.append((label, lambda seed, source=source: source))
         if not found:
@@ -226,10 +231,10 @@ class Group:
 
     def _files(self, pattern: str, beside: Path | None = None) -> list[str]:
         """Whole paths; InputError where there are none."""
-        beside = (beside or self._beside).resolve()
+        beside = (beside or self._recordings_in).resolve()
         found = sorted(str(beside / path) for path in glob(pattern, root_dir=beside, recursive=True))
         if not found:
-            where = "beside the plan" if beside == self._beside.resolve() else f"in {quoted(beside)}"
+            where = "beside the plan" if beside == self._beside.resolve() else f"in {quoted(beside, 300)}"
             raise InputError(f"{self._where} recordings: no file {quoted(pattern)!r} {where}")
         return found
 

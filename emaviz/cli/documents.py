@@ -48,6 +48,23 @@ class RecoveredJson(TypedDict):
     bytes: Annotated[int, Meta(description="its size")]
 
 
+class DataSetJson(TypedDict):
+    """Recordings of others, that benchmarks compute on."""
+
+    name: Annotated[str, Meta(description="of the set, and of its folder")]
+    repository: Annotated[str, Meta(description="of GitHub: owner/name")]
+    commit: Annotated[str, Meta(description="of which the files are")]
+    licence: Annotated[str, Meta(description="as the repository states it")]
+    files: Annotated[dict[str, str], Meta(description="SHA-256 by path in the repository")]
+
+
+class DataJson(TypedDict):
+    """Data sets that are known, and recordings that were made of one."""
+
+    sets: Annotated[list[DataSetJson], Meta(description="all of them, or the one that was named")]
+    written: Annotated[list[str], Meta(description="recordings, with --from")]
+
+
 class EffectParameterFactsJson(TypedDict):
     """One number of an effect."""
 

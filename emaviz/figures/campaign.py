@@ -110,6 +110,28 @@ def errors_beside(
     return chart
 
 
+# --- errors of methods beside each other, a row for what they were held to, a colour a method -------------------------
+
+
+def methods_beside(title: str, errors: Mapping[str, Means], *, dark: bool = False) -> go.Figure:
+    """errors: by method, of each row; the first method is drawn large."""
+    chart = theme.new(title, "Error, in the row's unit", "", dark=dark)
+    for i, (method, its) in enumerate(errors.items()):
+        chart.add_trace(
+            go.Scatter(
+                x=[max(value, _ERRORS_BESIDE_LEAST) for value in its.values()],
+                y=[theme.plain(row) for row in its],
+                mode="markers",
+                name=theme.plain(method),
+                marker={"color": colour(i), "size": 13 if i == 0 else 8, "symbol": "circle" if i == 0 else "diamond"},
+                hovertemplate="%{y}: %{x:.3g}",
+            )
+        )
+    chart.update_xaxes(type="log")
+    chart.update_yaxes(autorange="reversed", nticks=0)
+    return chart
+
+
 # --- how many searches converge: the median of their best errors, and the band that nine of ten keep to ---------------
 
 _CONVERGENCE_BANDS_LEAST = 1e-9  # a logarithmic axis has no zero

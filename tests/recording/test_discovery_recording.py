@@ -81,7 +81,8 @@ def test_words_tell_the_verdict_the_effect_and_the_candidates(found, written):
     assert "effects_found" not in verdict[0], "that name is for programs"
     [ranking] = _columns(written, "/discovery/candidates", "TextDocument:text")
     assert (
-        "|\n| Cogging torque |" in ranking[0] and "| Dead time | – |  | &lt; 0.1 % | these recordings cannot show it" in ranking[0]
+        "|\n| Cogging torque |" in ranking[0]
+        and "| Dead time | – |  | &lt; 0.1 % | these recordings cannot show it" in ranking[0]
     )
     told = read(written).properties["discovery"]
     assert told["verdict"] == "effects_found" and told["effects"][0]["name"] == "cogging_torque"

@@ -228,7 +228,10 @@ class _Starts:
         self._tell_soon()
 
     def _tell_soon(self) -> None:
-        self._files.post("plan", lambda: self._page.checked(self._tell, self._name))
+        def tell() -> None:
+            self._page.checked(self._tell, self._name)
+
+        self._files.post("plan", tell)
 
     def _tell(self) -> None:
         self._about.content = _box(self._campaigns.about(self._asked))

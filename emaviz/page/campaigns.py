@@ -55,7 +55,7 @@ class CampaignControls:
     ) -> None:
         """opened(path, run): a row was simulated again, and is recorded there; standings: says how the tables stand."""
         self._page, self._at, self._campaigns, self._files = page, at, campaigns, files
-        self._new = False  # one has begun, and is not yet chosen
+        self._new = self._unseen = False  # one has begun, and is not yet chosen; and nobody has seen it
         self._rows: dict[str, str] = {}  # names of the rows, by what the list says of them
         gui = page.server.gui
         with gui.add_folder("Campaigns", expand_by_default=False):
@@ -84,6 +84,7 @@ class CampaignControls:
         self._group.on_update(lambda event: event.client and self._post(self._show_rows))
         self._open.on_click(lambda _: self._post(self._open_chosen))
         again.on_click(lambda _: self._post(self.refresh))
+        page.workspaces.entered.connect(self._show_it)
         campaigns.computing.began.connect(lambda _: self._begun())
         campaigns.grown.connect(lambda name: self._post(lambda: self._grow(name)))
         campaigns.written.connect(lambda name, _: self._post(lambda: self._grow(name)))
@@ -143,8 +144,14 @@ class CampaignControls:
 
     def _begun(self) -> None:
         """One is computed: it is chosen with its first rows."""
-        self._new = True
-        self._page.workspaces.bring_forward(self._at.name, "", _TAB)
+        self._new = self._unseen = True
+        self._show_it(self._at.name)
+
+    def _show_it(self, workspace: str) -> None:
+        """Its tab comes to the front, once, in a window that is here or comes here."""
+        if self._unseen and workspace == self._at.name and self._page.workspaces.anyone(workspace):
+            self._unseen = False
+            self._page.workspaces.bring_forward(workspace, "", _TAB)
 
     def _grow(self, name: str) -> None:
         """Rows more of a campaign; one that has just begun is the one that is shown."""
@@ -221,7 +228,10 @@ class _Starts:
         self._tell_soon()
 
     def _tell_soon(self) -> None:
-        self._files.post("plan", lambda: self._page.checked(self._tell, self._name))
+        def tell() -> None:
+            self._page.checked(self._tell, self._name)
+
+        self._files.post("plan", tell)
 
     def _tell(self) -> None:
         self._about.content = _box(self._campaigns.about(self._asked))

@@ -147,8 +147,9 @@ def unseen(controls: Sequence[str]) -> Html:
 
 def unseen_field(field: str) -> Html:
     """The same for a field of text, which its label alone names by its id."""
-    row = f".mantine-Flex-root:has(label[for='{field}'])"
-    return unescaped(f"<style>{row},div:has(> {row}){{display:none!important}}</style>")
+    label = f"label[for='{field}']"
+    rows = f".mantine-Flex-root:has({label}),div:has(> .mantine-Flex-root {label})"
+    return unescaped(f"<style>{rows}{{display:none!important}}</style>")
 
 
 def caption(text: str) -> Html:

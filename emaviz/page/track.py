@@ -251,7 +251,8 @@ class TrackResult:
             if name in self._faults.values():
                 self._fault.value, self._by_hand = BY_NAME[name].label, True
         days = [int(one) for one in place.get("today", ()) if one.isdecimal()]
-        self._today.value = min(max([*days, self._today.min] if days else [self._today.max]), self._today.max)
+        first, last = min(self._history.looks), max(self._history.looks)
+        self._today.value = min(max(first, *days), last) if days else last
         self._draw()
 
     def _choose(self) -> None:

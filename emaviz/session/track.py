@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import base64
 import binascii
+import math
 import threading
+import time
 from collections.abc import Collection, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
@@ -134,6 +136,7 @@ def keep(found: Tracked, actuator: str, folder: DataFolder, suffix: str) -> Path
 
 # --- the flights of a folder: identified one after another, followed, and taken up as they arrive ---------------------
 
+_SHOWN_EVERY_S = 0.5  # at least, between two pictures of flights so far
 _FOLLOWING = 0.02  # share of the bar that following takes, after flights were identified
 
 
@@ -166,6 +169,7 @@ class Following:
         self._path: Path | None = folder.folder  # None: a session's, which is not there
         self._flights: dict[Path, Flight] = {}
         self._versions: dict[Path, str] = {}  # of the recordings that were read
+        self._shown_at = -math.inf  # when flights so far were
         self._looks_on = False  # at what arrives, since flights of this folder were asked for
         self._brought_flights: list[Flight] = []  # by a session, until they are followed
         self._watched = Watched()
@@ -325,8 +329,9 @@ class Following:
         if growing.last is None:
             self.events.began(flights, count)
             return
-        self.history = growing.copy()
-        self.events.followed(self.history)
+        if time.monotonic() - self._shown_at > _SHOWN_EVERY_S:
+            self._shown_at, self.history = time.monotonic(), growing.copy()
+            self.events.followed(self.history)
 
     def _follow(self, run: Run, share: float) -> None:
         """Looks after each flight, of all that are identified; share: of the bar."""

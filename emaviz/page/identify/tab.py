@@ -272,7 +272,10 @@ class IdentifyTab(Tab):
         self._standing = self.standing(provenance)
 
         def write(suffix: str) -> None:
-            worker.post(f"identify {suffix}", lambda: files.came(identifying.keep(suffix)))
+            def keep() -> None:
+                files.came(identifying.keep(suffix))
+
+            worker.post(f"identify {suffix}", keep)
 
         files = provenance.files = ResultFiles((REPORT.suffix, RECORD.suffix), lambda: provenance.of, write)
         self.result = IdentifyResult(

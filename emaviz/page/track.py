@@ -252,7 +252,7 @@ class TrackResult:
                 self._fault.value, self._by_hand = BY_NAME[name].label, True
         days = [int(one) for one in place.get("today", ()) if one.isdecimal()]
         first, last = min(self._history.looks), max(self._history.looks)
-        self._today.value = min(max(first, *days), last) if days else last
+        self._today.value = int(min(max(first, *days), last) if days else last)
         self._draw()
 
     def _choose(self) -> None:

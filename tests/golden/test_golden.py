@@ -38,7 +38,10 @@ _PROGRESS = re.compile(r"(?m)^\[\d+:\d+:\d+\] .*\n")  # of a machine that is slo
 NUMBER = re.compile(
     HASH + r"|(?<![A-Za-z_0-9])[+−-]?(?<![A-Za-z_])\d+(?:[.,]\d+)*(?:[eE][+−-]?\d+|·10[⁺⁻⁰¹²³⁴⁵⁶⁷⁸⁹]+)?"
 )
-RANKED = re.compile(r"(?:^ ?[A-Z][A-Za-z -]+ #\n)+", re.MULTILINE)  # what is as good as nothing may change places
+# What is as good as nothing may change places, and hold any number.
+RANKED = re.compile(r"(?:^ ?[A-Z][A-Za-z ()#-]+ #(?: #)?(?: < # %)?\n)+", re.MULTILINE)
+NOTHING = 1e-3  # a probability
+OF_CHANCE = ("settings", "predicted_drop", "refitted_drop", "probability", "tested")
 LONGEST_LIST = 8  # longer ones are told by their length and their mean
 
 
@@ -201,7 +204,8 @@ def _short(value: Any, folder: Path) -> Any:
     """Long lists by their length and mean, candidates by name (the last ones are as good as nothing), texts masked."""
     if isinstance(value, dict):
         if isinstance(value.get("candidates"), list):
-            value = {**value, "candidates": sorted(value["candidates"], key=lambda one: one["name"])}
+            ranked = sorted(value["candidates"], key=lambda one: one["name"])
+            value = {**value, "candidates": [_if_it_counts(one) for one in ranked]}
         return {_masked(key, folder).strip(): _short(one, folder) for key, one in value.items()}
     if isinstance(value, list):
         numbers = [one for one in value if isinstance(one, int | float)]
@@ -209,6 +213,12 @@ def _short(value: Any, folder: Path) -> Any:
             return {"length": len(value), "mean": math.fsum(numbers) / len(numbers)}
         return [_short(one, folder) for one in value[:LONGEST_LIST]] + [f"{len(value)} in all"]
     return _masked(value, folder).strip() if isinstance(value, str) else value
+
+
+def _if_it_counts(candidate: dict[str, Any]) -> dict[str, Any]:
+    if candidate.get("probability") is None or candidate["probability"] >= NOTHING:
+        return candidate
+    return {key: one for key, one in candidate.items() if key not in OF_CHANCE}
 
 
 def _differences(expected: Any, found: Any, tolerance: float, where: str = "") -> Iterator[str]:

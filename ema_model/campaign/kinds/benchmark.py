@@ -19,7 +19,6 @@ from ema_model.campaign.kinds.kind import NUMBER, NUMBERS, TEXT, TEXTS, Kind
 from ema_model.campaign.plan_axes import TaskInputs
 from ema_model.comparison.free_simulation import in_open_loop
 from ema_model.discovery import as_dict, discover
-from ema_model.discovery.discover import ENGINES
 from ema_model.errors import InputError, quoted
 from ema_model.models import ClosedLoop, InverseDynamics
 from ema_model.models.measured_motion import Stretch
@@ -146,7 +145,7 @@ def regressed_servo(inputs: TaskInputs) -> tuple[dict[str, float], Errors]:
     """
     actuator = replace(inputs.actuator.without_controller(), leaves_out_reversals=False)
     swapped = [[_driven_by_its_error(prepared(one, inputs.actuator)) for one in every] for every in _both(inputs)]
-    found, _ = regressed(TaskInputs(actuator, *swapped))
+    found, _ = regressed(TaskInputs(actuator, swapped[0], swapped[1]))
     if not found["inertia"] > 0.0:
         raise FloatingPointError("the regression finds no inertia, so that nothing can be simulated")
     row = np.array([found[name] for name in ("inertia", "viscous", "coulomb", "sin", "cos", "offset")])
@@ -208,7 +207,6 @@ class Settings:
 
     method: str = _OURS
     measure: str = "following"
-    engine: str = "evidence"
     mass_kg: float = 0.49
     length_m: float = 0.1
     supply_V: float = 7.4
@@ -216,7 +214,7 @@ class Settings:
     evaluations: int = 8000
 
     def __post_init__(self) -> None:
-        for name, known in (("method", METHODS), ("measure", MEASURES), ("engine", ENGINES)):
+        for name, known in (("method", METHODS), ("measure", MEASURES)):
             if getattr(self, name) not in known:
                 raise InputError(f"no {name} {quoted(getattr(self, name))!r}; there are {', '.join(known)}")
         if self.method.startswith("bam_") and self.measure != "following":
@@ -265,7 +263,7 @@ def _run(inputs: TaskInputs, settings: Settings, seed: int) -> dict[str, Any]:
 
 def _discovered(inputs: TaskInputs, settings: Settings) -> tuple[dict[str, Any], Actuator]:
     """By `discover` alone: the held-out recordings are looked at as by whoever holds some out."""
-    found = discover(inputs.fitted, inputs.actuator, holdout=inputs.held, engine=settings.engine)
+    found = discover(inputs.fitted, inputs.actuator, holdout=inputs.held)
     told = as_dict(found)
     parameters = {
         **{name: _short(one) for name, one in told["calibration"]["parameters"].items()},

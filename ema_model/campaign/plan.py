@@ -231,10 +231,10 @@ class Group:
 
     def _files(self, pattern: str, beside: Path | None = None) -> list[str]:
         """Whole paths; InputError where there are none."""
-        beside = (beside or self._recordings_in).resolve()
-        found = sorted(str(beside / path) for path in glob(pattern, root_dir=beside, recursive=True))
+        folder = (beside or self._recordings_in).resolve()
+        found = sorted(str(folder / path) for path in glob(pattern, root_dir=folder, recursive=True))
         if not found:
-            where = "beside the plan" if beside == self._beside.resolve() else f"in {quoted(beside, 300)}"
+            where = "beside the plan" if folder == self._beside.resolve() else f"in {quoted(folder, 300)}"
             raise InputError(f"{self._where} recordings: no file {quoted(pattern)!r} {where}")
         return found
 

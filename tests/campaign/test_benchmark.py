@@ -185,6 +185,20 @@ def test_a_servo_is_held_to_bams_measure():
     assert min(followed(logs, stiffer)) > 12.0
 
 
+def test_discovery_never_sees_what_is_held_out(monkeypatch):
+    class Asked(Exception):
+        pass
+
+    def asked(measurements, actuator, **options):
+        assert [one.name for one in measurements] == ["joint at 1.3"] and not options.get("holdout")
+        raise Asked
+
+    monkeypatch.setattr("ema_model.campaign.kinds.benchmark.discover", asked)
+    inputs = TaskInputs(load_actuator(ASSETS / "field" / "ur10e.toml"), [joint(4.0, 1.3)], [joint(4.0, 1.7)])
+    with pytest.raises(Asked):
+        KIND.run(inputs, Settings(measure="torque"), 0)
+
+
 def test_what_no_method_can_do_is_refused_in_one_line():
     for wrong, told in (
         ({"method": "bam_m7"}, "no method 'bam_m7'; there are discover, bam_m1"),

@@ -103,7 +103,7 @@ class Logs:
         for name, value in parameters.items():
             row[_PLACE[name]] = value
         shown = self.simulated(row, bench)
-        return np.array([np.mean(one) for one in np.split(np.abs(shown - self.measured_rad), self.ends[:-1])])
+        return np.array([float(np.mean(one)) for one in np.split(np.abs(shown - self.measured_rad), self.ends[:-1])])
 
     def simulated(self, row: Array, bench: Bench) -> Array:
         """The positions from each log's first one on, (steps,)."""

@@ -122,7 +122,7 @@ class Group:
         source = source if self._kind.from_recordings else ()
         check_names(table, (*_SHARED, *source, *options), where)
         self._text, self._actuator = self._told("actuator", self._actuator_file)
-        self._recordings_in = self._told("data", lambda: folder_of(table["data"])) if "data" in table else beside
+        self._recordings_in: Path = self._told("data", lambda: folder_of(table["data"])) if "data" in table else beside
         self._seeds = self._told("seeds", lambda: _seeds(table.get("seeds", [0])))
         self._settings = self._told("", lambda: self._all_settings(options))
         if not self._kind.from_recordings:
@@ -231,7 +231,7 @@ class Group:
 
     def _files(self, pattern: str, beside: Path | None = None) -> list[str]:
         """Whole paths; InputError where there are none."""
-        beside = (beside or self._recordings_in).resolve()
+        beside = (self._recordings_in if beside is None else beside).resolve()
         found = sorted(str(beside / path) for path in glob(pattern, root_dir=beside, recursive=True))
         if not found:
             where = "beside the plan" if beside == self._beside.resolve() else f"in {quoted(beside, 300)}"

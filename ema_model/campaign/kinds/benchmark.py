@@ -145,8 +145,8 @@ def regressed_servo(inputs: TaskInputs) -> tuple[dict[str, float], Errors]:
     Coefficients per rad of that error; the errors are of a simulation from the goal, mrad.
     """
     actuator = replace(inputs.actuator.without_controller(), leaves_out_reversals=False)
-    swapped = [[_driven_by_its_error(prepared(one, inputs.actuator)) for one in every] for every in _both(inputs)]
-    found, _ = regressed(TaskInputs(actuator, *swapped))
+    fitted, held = ([_driven_by_its_error(prepared(one, inputs.actuator)) for one in every] for every in _both(inputs))
+    found, _ = regressed(TaskInputs(actuator, fitted, held))
     if not found["inertia"] > 0.0:
         raise FloatingPointError("the regression finds no inertia, so that nothing can be simulated")
     row = np.array([found[name] for name in ("inertia", "viscous", "coulomb", "sin", "cos", "offset")])

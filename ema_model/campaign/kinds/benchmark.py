@@ -144,8 +144,8 @@ def regressed_servo(inputs: TaskInputs) -> tuple[dict[str, float], Errors]:
     Coefficients per rad of that error; the errors are of a simulation from the goal, mrad.
     """
     actuator = replace(inputs.actuator.without_controller(), leaves_out_reversals=False)
-    swapped = [[_driven_by_its_error(prepared(one, inputs.actuator)) for one in every] for every in _both(inputs)]
-    found, _ = regressed(TaskInputs(actuator, swapped[0], swapped[1]))
+    fitted, held = ([_driven_by_its_error(prepared(one, inputs.actuator)) for one in every] for every in _both(inputs))
+    found, _ = regressed(TaskInputs(actuator, fitted, held))
     if not found["inertia"] > 0.0:
         raise FloatingPointError("the regression finds no inertia, so that nothing can be simulated")
     row = np.array([found[name] for name in ("inertia", "viscous", "coulomb", "sin", "cos", "offset")])
@@ -262,8 +262,8 @@ def _run(inputs: TaskInputs, settings: Settings, seed: int) -> dict[str, Any]:
 
 
 def _discovered(inputs: TaskInputs, settings: Settings) -> tuple[dict[str, Any], Actuator]:
-    """By `discover` alone: the held-out recordings are looked at as by whoever holds some out."""
-    found = discover(inputs.fitted, inputs.actuator, holdout=inputs.held)
+    """By `discover` alone, which never sees what is held out: given to it, that would weigh models as well."""
+    found = discover(inputs.fitted, inputs.actuator)
     told = as_dict(found)
     parameters = {
         **{name: _short(one) for name, one in told["calibration"]["parameters"].items()},

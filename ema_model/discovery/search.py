@@ -8,7 +8,7 @@ is any that is far more probable than what is there.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -158,10 +158,11 @@ class Round:
         fitted = after.fitted - self.before.fitted + share
         return Contender(trial, after.log - self.before.log + share, fitted, after.density + after.unseen)
 
-    def probabilities(self, contenders: Sequence[Contender] = ()) -> dict[str, float]:
+    def probabilities(self, contenders: Sequence[Contender] = (), ruled_out: Collection[str] = ()) -> dict[str, float]:
         """How probable each candidate is, of all and none: of what was refitted by that, of the others by algebra."""
         gains = {one.candidate.name: one.gain for one in self.best}
         gains |= {one.trial.candidate.name: one.gain for one in contenders}
+        gains = {name: gain for name, gain in gains.items() if name not in ruled_out}
         odds = {name: gain + self.prior for name, gain in gains.items()}
         whole = float(np.logaddexp.reduce([0.0, *odds.values()]))
         return {name: math.exp(one - whole) for name, one in odds.items()}
@@ -346,7 +347,8 @@ class Search:
         story.add(first.trial, ties=[trial.candidate.name for trial in others])
         story.finish(self.tell)
         if not first.trial.faults:
-            probable = seen.probabilities(contenders)
+            beyond = {one.trial.candidate.name for one in contenders if one.gain + seen.prior > NAMED}
+            probable = seen.probabilities(contenders, beyond - {one.trial.candidate.name for one in named})
             story.set_probability(min(1.0, sum(probable[name] for name in as_probable)))
         return True
 

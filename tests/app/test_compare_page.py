@@ -371,7 +371,7 @@ def test_a_file_is_dropped_on_the_scene(compare, app):
     rows = "\n".join(f"{i * 1e-3},{np.sin(0.1 * i):.6f}" for i in range(300))
     compare.evaluate(DROP, ["dropped.csv", f"time [s],I_motor [A]\n{rows}\n"])
     wait_until(lambda: "uploads/dropped.csv" in app.comparing.opened)
-    compare.get_by_text("← I_motor [A]").wait_for()
+    wait_until(lambda: in_the_table(compare, "I_motor [A]") == ["current_A", "A", "+", "0"])
     lists = [app.tab(CompareTab).panel._choice, app.tab(IdentifyTab).panel._source]
     wait_until(lambda: all("uploads/dropped.csv" in one.options for one in lists))
     wait_until(lambda: any(one.startswith("uploads (") for one in app.tab(TrackTab).panel._folder.control.options))

@@ -119,7 +119,9 @@ def test_what_promises_more_than_the_refitted_is_refitted_too(monkeypatch):
     """A delay that looks best by algebra, and is nothing once refitted, hides no other."""
     gains = {"best": 25.0, "next": 14.0, "third": 4.0, "hopeless": 1.0}
     terms = [
-        SimpleNamespace(term=SimpleNamespace(fingerprint=object(), log_share=0.0), gain=g, candidate=n)
+        SimpleNamespace(
+            term=SimpleNamespace(fingerprint=object(), log_share=0.0), gain=g, candidate=SimpleNamespace(name=n)
+        )
         for n, g in gains.items()
     ]
     real = {"best": -1.0, "next": 12.0, "third": 3.0}
@@ -129,7 +131,7 @@ def test_what_promises_more_than_the_refitted_is_refitted_too(monkeypatch):
     monkeypatch.setattr(of, "round", lambda: seen)
     monkeypatch.setattr(of, "_is_far", lambda: False)
     monkeypatch.setattr(
-        search, "fits", lambda job, chosen, tell: [SimpleNamespace(fit=one.candidate) for one in chosen]
+        search, "fits", lambda job, chosen, tell: [SimpleNamespace(fit=one.candidate.name) for one in chosen]
     )
     monkeypatch.setattr(search, "evidence_of_fit", lambda data, held, fit, noise: Evident(real[fit], 0.0, 0.0))
     assert [(one.trial.fit, one.gain) for one in of._contenders()] == [("next", 12.0), ("best", -1.0)]

@@ -105,7 +105,7 @@ def result_of(
         calibration=calibration,
         effects=named,
         ladder=story.ladder,
-        candidates=candidates,
+        candidates=_as_named(candidates, named),
         faults=faults,
         parameters_outside_tolerance=list(dict.fromkeys([*(one.stands_for for one in freed), *outside])),
         actuator=calibration.actuator,
@@ -138,6 +138,16 @@ def result_of(
         freed=freed,
         simulation=free_simulation(story.data, story.held, story.current),
     )
+
+
+def _as_named(candidates: Sequence[Candidate], named: Sequence[Added]) -> list[Candidate]:
+    """Candidates of the first round, those that were named since as probable as they are said to be."""
+    since = {one.name: one.probability or 0.0 for one in named}
+    told = [
+        replace(one, probability=max(one.probability or 0.0, since[one.name])) if one.name in since else one
+        for one in candidates
+    ]
+    return sorted(told, key=lambda one: -(one.probability or 0.0))
 
 
 def settings_of(found: Discovery) -> Mapping[str, Mapping[str, float]]:

@@ -31,7 +31,7 @@ def page(shared_page):
 
 def go(page, name):
     page.get_by_role("tab", name=name, exact=True).click()
-    wait_until(lambda: f"?view={name.lower()}" in page.url, 60.0)  # the address may say more, and comes late on a busy machine
+    wait_until(lambda: f"?view={name.lower()}" in page.url, 60.0)  # comes late on a busy machine
 
 
 def box(page, element):

@@ -335,8 +335,8 @@ class Story:
 
     def back_to_before(self, key: str) -> None:
         """Takes an effect back, and all that was done since it was added."""
-        first = next(i for i, step in enumerate(self.steps) if any(one.key == key for one in step.added))
-        del self.steps[first:]
+        while any(one.key == key for one in self.added):
+            self.undo()
 
     def restart(self) -> None:
         """Takes all effects back."""

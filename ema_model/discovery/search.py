@@ -296,8 +296,7 @@ class Search:
         story, seen = self.story, self.round()
         if self._refitted is None or self._refitted[0] is not seen:
             is_full = len({one.name for one in story.added}) >= self._most
-            room = [one for one in seen.best if one.term.fingerprint is None or not is_full]
-            room = [one for one in room if one.candidate.name not in self._barred]
+            room = [one for one in self._open(seen) if one.term.fingerprint is None or not is_full]
             might = 0.0 if self._is_far() else MIGHT  # so far off, what is straight tells little
             found: list[Contender] = []
             best = -math.inf
@@ -311,6 +310,10 @@ class Search:
                 best = max(one.gain for one in found)  # what promises more than this is refitted, too
             self._refitted = seen, sorted(found, key=lambda one: -one.gain)
         return self._refitted[1]
+
+    def _open(self, seen: Round) -> list[ScoredTerm]:
+        """The Terms of a round that may be added, the most probable first."""
+        return [one for one in seen.best if one.candidate.name not in self._barred]
 
     def _refit(self, one: ScoredTerm, tell: Progress) -> Trial:
         """A Term in the last model, refitted from where the algebra has it; far off, what tells most, to its end."""
@@ -384,7 +387,7 @@ class Search:
         """Turns back the encoder of held-out recordings that deny what the fitted ones show; whether any was."""
         story, prior = self.story, self.round().prior
         by_angle = [one for one in contenders if any(goes_by_angle(key) for key in one.trial.effects)]
-        if story.held is None or not any(one.fitted + prior > NAMED for one in by_angle):
+        if story.held is None or story.turned or not any(one.fitted + prior > NAMED for one in by_angle):
             return False
         alone = Story(story.data, None, [*story.steps])
         Search(alone, self._names, self._most, self.tell)._go_to_the_end()
@@ -408,7 +411,7 @@ class Search:
                 story.refused[one.name] = reason
                 self._barred.add(one.name)
                 story.back_to_before(one.key)
-                self._going = True
+                self._rivals, self._going = [], True
                 return True
         return False
 
@@ -461,11 +464,11 @@ class Search:
         straight: the logarithm of the whole model's evidence, by algebra.
         """
         story, tell = self.story, self.tell
-        if not seen.best:
+        terms = [one.term for one in self._open(seen)]
+        if not terms:
             return False
         about = whole.without(places_of(seen.beside, key))
         own = evidence_of(seen.noise, about.residual, about.unknowns)
-        terms = [one.term for one in seen.best]
         rough = gains_of(seen.noise, own, about.unknowns, [one.unknowns for one in terms])
         term = terms[int(np.argmax(rough + [one.log_share for one in terms]))]
         other = evidence_of(seen.noise, about.residual, about.unknowns.beside([term.unknowns]), own.levels)

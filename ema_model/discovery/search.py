@@ -70,23 +70,16 @@ def search(
     *,
     candidates: Sequence[str] | None = None,
     most_effects: int = NO_LIMIT,
-    known: Search | None = None,
+    looks: Looks | None = None,
 ) -> Found:
     """Goes on by itself from where a story stands: adds what is missing, takes out what is not, draws what is unknown.
 
     Where a closed loop is left unexplained, inverse dynamics is asked as well, and takes over if the controller is to
     blame, or if the loop names nothing, or little of what is left.  tell is told after each step, too, and may raise
-    to stop; the story then stands at its last whole step.  known: a search that has looked at this story before.
+    to stop; the story then stands at its last whole step.  looks: those that were taken at this story before.
     """
-    own = known or Search(story, candidates, most_effects)
-    before, own.tell = own.tell, tell
-    try:
-        return _searched(story, own, _Beside(story, tell, candidates, most_effects))
-    finally:
-        own.tell = before
-
-
-def _searched(story: Story, own: Search, beside: _Beside) -> Found:
+    own = Search(story, candidates, most_effects, tell, looks)
+    beside = _Beside(story, tell, candidates, most_effects)
     left = max(FAR, LOOP_TOLD * ratio(story.data, story.base))
     # A loop whose drive is another one is searched in vain; one that lacks a limit, which is not straight, tells so
     # only once that is refitted.
@@ -108,12 +101,12 @@ def _searched(story: Story, own: Search, beside: _Beside) -> Found:
                 if wanted and beside.explains_better():
                     found = beside.taken_over()
                 else:
-                    compared(story, opinion, own.tell)
+                    compared(story, opinion, tell)
     if not story.current.plant.simulates_commands:
         seen = story.data.measurements, story.current.calibration.actuator
         story.transmission_seen = transmission_seen(*seen)
         story.two_masses_seen = None if at_floor(story.data, story.current) else two_masses_seen(*seen)
-    story.disagreements = [*story.turned, *contradictions(story, own.tell)]
+    story.disagreements = [*story.turned, *contradictions(story, tell)]
     return found
 
 
@@ -180,6 +173,53 @@ class Round:
         return sorted(every, key=lambda one: -(one.probability or 0.0))
 
 
+class Looks:
+    """What was seen beside the models of a story, the last of them once; it may outlast a search."""
+
+    def __init__(self, candidates: Sequence[str] | None = None) -> None:
+        self._names = candidates
+        self._last: tuple[Fit, Data | None, Round] | None = None  # with what was held out
+        self._made: list[Term] = []  # all Terms of effects, beside an earlier model
+        self._hidden: Sequence[Candidate] = ()
+
+    def beside(self, story: Story, tell: Progress = lambda text: None) -> Round:
+        """All Terms beside the last model of a story."""
+        found, held = story.current, story.held
+        if self._last is None or self._last[0] is not found or self._last[1] is not held:
+            noise = noise_of(story.data, found)
+            tell("scoring the candidates")
+            best = scored_terms(found, self._terms(story, noise), noise)
+            before = evidence_of_fit(story.data, held, found, noise)
+            self._last = found, held, Round(found, noise, before, self._hidden, best)
+        return self._last[2]
+
+    def _terms(self, story: Story, noise: NoiseModel) -> list[Term]:
+        """The Terms beside the last model: the first time all of them, then anew those that might tell most.
+
+        What a Term changes depends little on what else is in the model: enough to know which are hopeless.
+        """
+        found, known, shown = story.current, self._made, story.left().orders
+        are_of_this = known and len(known[0].columns) == len(found.residual)
+        if not are_of_this or found.actuator.axes.motor == "linear":  # whose orders are the residual's
+            prints, barred = story.fingerprints(self._names or None)
+            unseen = [Candidate(name, 0.0, {}, reason) for name, reason in hidden(found, prints).items()]
+            self._hidden = [*unseen, *barred]
+            terms = terms_of(story.data, found, [*prints, *_further_orders(story, shown)], noise, shown)
+            self._made = [one for one in terms if one.fingerprint and not one.fingerprint.frees]
+            return terms
+        about = AboutFit.of(found, noise)
+        own = evidence_of(noise, about.residual, about.unknowns)
+        gains = gains_of(noise, own, about.unknowns, [one.unknowns for one in known])
+        telling = [known[i] for i in np.argsort(-gains)[:_MADE_ANEW]]
+        names = {one.name for one in telling}
+        orders = sorted({one.fingerprint.settings["order"] for one in telling if "order" in one.fingerprint.settings})
+        present = found.actuator.effects
+        ours = [name for name in story.of_the_file if name in present]  # beyond their tolerances
+        prints, _ = story.fingerprints([*(name for name in CATALOGUE if name in names), *ours], orders)
+        terms = terms_of(story.data, found, [*prints, *_further_orders(story, orders)], noise, shown)
+        return terms + [one for one in known if one.name not in names and one.name not in present]
+
+
 class Search:
     """A story that goes on by one evidence; each of its models is looked at once."""
 
@@ -189,18 +229,17 @@ class Search:
         candidates: Sequence[str] | None = None,
         most_effects: int = NO_LIMIT,
         tell: Progress = lambda text: None,
+        looks: Looks | None = None,
     ) -> None:
-        self.story, self.tell = story, tell
+        self.story, self._tell = story, tell
         self._names, self._most = candidates, most_effects
+        self._looks = looks or Looks(candidates)
         self._first: list[Candidate] = []
         self._rivals: list[Trial] = []
         self._curve: Trial | None = None
         self._going = True
-        self._known: Round | None = None
         self._refitted: tuple[Round, list[Contender]] | None = None
         self._exchanges: set[tuple[str, str]] = set()  # that were tried
-        self._made: list[Term] = []  # all Terms of effects, beside an earlier model
-        self._hidden: Sequence[Candidate] = ()
         self._barred: set[str] = set()  # effects that were added, and spoken against once all was there
 
     # --- whether a closed loop is worth a search ----------------------------------------------------------------------
@@ -208,11 +247,11 @@ class Search:
     def is_untold(self) -> bool:
         """Whether the loop is far off, and nothing would tell most of it."""
         most = TOLD_WELL * self.story.current.chi2
-        return self._is_far() and all(one.candidate.predicted_drop < most for one in self.round().best)
+        return self._is_far() and all(one.candidate.predicted_drop < most for one in self._round().best)
 
     def suspects_drive(self) -> bool:
         """Whether the loop is far off, and what is most probable is of the drive."""
-        best = self.round().best if self._is_far() else []
+        best = self._round().best if self._is_far() else []
         return bool(best) and _of_drive(best[0].candidate)
 
     def drive_leaves(self) -> float:
@@ -228,7 +267,7 @@ class Search:
 
     def ended(self) -> Found:
         """Goes on to the end, draws what is unknown, and settles."""
-        story, tell = self.story, self.tell
+        story, tell = self.story, self._tell
         self._go_to_the_end()
         self._curve_instead()
         story.finish(tell)
@@ -253,47 +292,13 @@ class Search:
 
     # --- what is seen beside the last model ---------------------------------------------------------------------------
 
-    def round(self) -> Round:
+    def _round(self) -> Round:
         """All Terms beside the last model."""
-        story, found = self.story, self.story.current
-        if self._known is None or self._known.beside is not found:
-            noise = noise_of(story.data, found)
-            self.tell("scoring the candidates")
-            best = scored_terms(found, self._terms(noise), noise)
-            before = evidence_of_fit(story.data, story.held, found, noise)
-            self._known = Round(found, noise, before, self._hidden, best)
-        return self._known
-
-    def _terms(self, noise: NoiseModel) -> list[Term]:
-        """The Terms beside the last model: the first time all of them, then anew those that might tell most.
-
-        What a Term changes depends little on what else is in the model: enough to know which are hopeless.
-        """
-        story, found = self.story, self.story.current
-        known, shown = self._made, story.left().orders
-        are_of_this = known and len(known[0].columns) == len(found.residual)
-        if not are_of_this or found.actuator.axes.motor == "linear":  # whose orders are the residual's
-            prints, barred = story.fingerprints(self._names or None)
-            unseen = [Candidate(name, 0.0, {}, reason) for name, reason in hidden(found, prints).items()]
-            self._hidden = [*unseen, *barred]
-            terms = terms_of(story.data, found, [*prints, *_further_orders(story, shown)], noise, shown)
-            self._made = [one for one in terms if one.fingerprint and not one.fingerprint.frees]
-            return terms
-        about = AboutFit.of(found, noise)
-        own = evidence_of(noise, about.residual, about.unknowns)
-        gains = gains_of(noise, own, about.unknowns, [one.unknowns for one in known])
-        telling = [known[i] for i in np.argsort(-gains)[:_MADE_ANEW]]
-        names = {one.name for one in telling}
-        orders = sorted({one.fingerprint.settings["order"] for one in telling if "order" in one.fingerprint.settings})
-        present = found.actuator.effects
-        ours = [name for name in story.of_the_file if name in present]  # beyond their tolerances
-        prints, _ = story.fingerprints([*(name for name in CATALOGUE if name in names), *ours], orders)
-        terms = terms_of(story.data, found, [*prints, *_further_orders(story, orders)], noise, shown)
-        return terms + [one for one in known if one.name not in names and one.name not in present]
+        return self._looks.beside(self.story, self._tell)
 
     def _contenders(self) -> list[Contender]:
         """The few Terms that might be the best beside the last model, refitted, the most probable first."""
-        story, seen = self.story, self.round()
+        story, seen = self.story, self._round()
         if self._refitted is None or self._refitted[0] is not seen:
             is_full = len({one.name for one in story.added}) >= self._most
             room = [one for one in self._open(seen) if one.term.fingerprint is None or not is_full]
@@ -305,7 +310,7 @@ class Search:
                 chosen = [one for one in left if one.gain > might * left[0].gain][: _REFITTED - len(found)]
                 if not chosen:
                     break
-                trials = fits(self._refit, chosen, self.tell)
+                trials = fits(self._refit, chosen, self._tell)
                 found += [seen.contender(story.data, story.held, one, trial) for one, trial in zip(chosen, trials)]
                 best = max(one.gain for one in found)  # what promises more than this is refitted, too
             self._refitted = seen, sorted(found, key=lambda one: -one.gain)
@@ -327,7 +332,7 @@ class Search:
     # --- one step -----------------------------------------------------------------------------------------------------
 
     def _added(self) -> bool:
-        story, seen, contenders = self.story, self.round(), self._contenders()
+        story, seen, contenders = self.story, self._round(), self._contenders()
         self._first = self._first or seen.candidates(contenders)
         named = [one for one in contenders if one.gain + seen.prior > NAMED and not self._objection(one)]
         if not named:
@@ -348,7 +353,7 @@ class Search:
         if others and not self._rivals:
             self._rivals = [first.trial, *others]
         story.add(first.trial, ties=[trial.candidate.name for trial in others])
-        story.finish(self.tell)
+        story.finish(self._tell)
         if not first.trial.faults:
             beyond = {one.trial.candidate.name for one in contenders if one.gain + seen.prior > NAMED}
             probable = seen.probabilities(contenders, beyond - {one.trial.candidate.name for one in named})
@@ -385,16 +390,15 @@ class Search:
 
     def _turned_back(self, contenders: Sequence[Contender]) -> bool:
         """Turns back the encoder of held-out recordings that deny what the fitted ones show; whether any was."""
-        story, prior = self.story, self.round().prior
+        story, prior = self.story, self._round().prior
         by_angle = [one for one in contenders if any(goes_by_angle(key) for key in one.trial.effects)]
         if story.held is None or story.turned or not any(one.fitted + prior > NAMED for one in by_angle):
             return False
         alone = Story(story.data, None, [*story.steps])
-        Search(alone, self._names, self._most, self.tell)._go_to_the_end()
+        Search(alone, self._names, self._most, self._tell)._go_to_the_end()
         keys = [one.key for one in alone.added if goes_by_angle(one.key)]
-        if not keys or not put_right(story, alone.current, keys, self.tell):
+        if not keys or not put_right(story, alone.current, keys, self._tell):
             return False
-        self._known = self._refitted = None
         return True
 
     # --- what is taken out again, or put in the place of another ------------------------------------------------------
@@ -420,7 +424,7 @@ class Search:
 
         Or where several low orders are one shape within the turn, and no teeth.
         """
-        story, seen = self.story, self.round()
+        story, seen = self.story, self._round()
         effects = story.current.calibration.actuator.effects
         orders = [effects[one.key]["order"] for one in story.added if "order" in effects[one.key]]
         if not story.added or (at_floor(story.data, story.current) and not is_a_shape(orders)):
@@ -428,7 +432,7 @@ class Search:
         added = story.steps[story.bare :]
         story.restart()
         try:
-            curve = story.curve(story.left().explanation, self.tell)
+            curve = story.curve(story.left().explanation, self._tell)
         finally:  # also when it was stopped
             story.steps += added
         if curve is None:
@@ -440,11 +444,11 @@ class Search:
 
     def _exchanged(self) -> bool:
         """Takes out what the last model does not need, or puts in its place what makes it more probable."""
-        story, tell = self.story, self.tell
+        story, tell = self.story, self._tell
         members = [*(one.key for one in story.added), *causes(story.current.faults)]
         if len(members) < 2:
             return False
-        seen = self.round()
+        seen = self._round()
         whole = AboutFit.of(seen.beside, seen.noise)
         straight = evidence_of(seen.noise, whole.residual, whole.unknowns).log
         for key in members:
@@ -463,7 +467,7 @@ class Search:
 
         straight: the logarithm of the whole model's evidence, by algebra.
         """
-        story, tell = self.story, self.tell
+        story, tell = self.story, self._tell
         terms = [one.term for one in self._open(seen)]
         if not terms:
             return False

@@ -128,7 +128,7 @@ def test_what_promises_more_than_the_refitted_is_refitted_too(monkeypatch):
     of = search.Search(SimpleNamespace(added=(), data=None, held=None))
     before = Evident(0.0, 0.0, 0.0)
     seen = search.Round(None, None, before, (), terms)
-    monkeypatch.setattr(of, "round", lambda: seen)
+    monkeypatch.setattr(of, "_round", lambda: seen)
     monkeypatch.setattr(of, "_is_far", lambda: False)
     monkeypatch.setattr(
         search, "fits", lambda job, chosen, tell: [SimpleNamespace(fit=one.candidate.name) for one in chosen]
@@ -162,7 +162,7 @@ def test_a_far_loop_is_untold_and_its_drive_suspected_where_that_tells_a_little(
     monkeypatch.setattr(search, "ratio", lambda data, found: floors)
     current = SimpleNamespace(chi2=1000.0, plant=SimpleNamespace(simulates_commands=simulates))
     of = search.Search(SimpleNamespace(data=None, current=current))
-    monkeypatch.setattr(of, "round", lambda: SimpleNamespace(best=[SimpleNamespace(candidate=one) for one in ranked]))
+    monkeypatch.setattr(of, "_round", lambda: SimpleNamespace(best=[SimpleNamespace(candidate=one) for one in ranked]))
     assert of.is_untold() is untold and of.suspects_drive() is suspected
 
 

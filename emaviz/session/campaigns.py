@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 import re
-import threading
 from collections.abc import Generator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
@@ -32,7 +31,7 @@ from ema_model.recordings import Measurement
 from emaviz.session.data_folder import DataFolder
 from emaviz.session.explore import Session
 from emaviz.session.inputs import Inputs, digest, version_of
-from emaviz.session.jobs import Job, Run, Signal, Steps, Stopped, Tell
+from emaviz.session.jobs import Job, Run, Signal, Steps, Stopped, Tell, elsewhere
 
 _HEADER = "campaign.json"
 _DEPTHS = ("*", "*/*")  # below the data folder
@@ -220,7 +219,6 @@ class Campaigns:
 def _computed(plan: Plan, folder: Path, workers: int, run: Run) -> Generator[Status | None, None, None]:
     """How far it is, several times a second, while processes compute; a stop ends them, and keeps their rows."""
     at: list[Status] = []
-    failed: list[BaseException] = []
 
     def told(status: Status) -> None:
         at[:] = [status]
@@ -228,22 +226,14 @@ def _computed(plan: Plan, folder: Path, workers: int, run: Run) -> Generator[Sta
             raise Stopped
 
     def compute() -> None:
-        try:
-            run_plan(plan, folder, scheduler(None, workers), on_progress=told)
-        except BaseException as error:
-            failed.append(error)
+        run_plan(plan, folder, scheduler(None, workers), on_progress=told)
 
-    thread = threading.Thread(target=compute, name="emaviz-campaign", daemon=True)
-    thread.start()
-    while thread.is_alive():
-        thread.join(_LOOK_S)
+    for _ in elsewhere(compute, "emaviz-campaign", _LOOK_S):
         if at:
             rows = at[0].there + at[0].computed
             errors = f", {at[0].errors} of them an error" if at[0].errors else ""
             run.say(f"{rows} of {at[0].total} rows{errors}", rows / max(at[0].total, 1))
         yield at[0] if at else None
-    if failed:
-        raise failed[0]
 
 
 def _named(task: Task) -> str:

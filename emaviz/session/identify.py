@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import copy
-import threading
 from collections.abc import Callable, Generator, Mapping
 from dataclasses import dataclass, field
 from datetime import datetime
@@ -24,7 +23,7 @@ from ema_model.quantities.numbers import amount
 from ema_model.recordings import Measurement
 from ema_model.simulation import plant
 from emaviz.session.inputs import Inputs, Provenance
-from emaviz.session.jobs import Job, Run, Signal, Steps, Worker
+from emaviz.session.jobs import Job, Run, Signal, Steps, Worker, elsewhere
 from emaviz.session.settings import SLIDERS, Settings, title
 
 if TYPE_CHECKING:
@@ -170,30 +169,10 @@ def target(
 ) -> Generator[None, None, tuple[Measurement, Array | None]]:
     """Steps that end with the recording to identify, and the true k if it is the sliders' plant."""
     if settings.source != SLIDERS:
-        return (yield from _elsewhere(lambda: open_file(settings.source))), None
+        # A large file takes seconds, in which the sliders shall answer.
+        return (yield from elsewhere(lambda: open_file(settings.source), "emaviz-read", _LOOK_S)), None
     run = plant.to_identify(settings.run(), actuator, settings.k, settings.fitness, settings.effects)
     return settings.sensors.record(run, settings.seed), settings.k
-
-
-def _elsewhere(read: Callable[[], Measurement]) -> Generator[None, None, Measurement]:
-    """Reads on a thread of its own: a large file takes seconds, in which the sliders shall answer."""
-    found: list[Measurement] = []
-    failed: list[Exception] = []
-
-    def work() -> None:
-        try:
-            found.append(read())
-        except Exception as error:
-            failed.append(error)
-
-    thread = threading.Thread(target=work, name="emaviz-read", daemon=True)
-    thread.start()
-    while thread.is_alive():
-        thread.join(_LOOK_S)
-        yield
-    if failed:
-        raise failed[0]
-    return found[0]
 
 
 def begin(settings: Settings, objective: Objective, truth: Array | None, known: bool | None = None) -> Race:

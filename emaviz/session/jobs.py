@@ -9,7 +9,7 @@ import time
 import traceback
 from collections.abc import Callable, Generator
 from dataclasses import dataclass, field
-from typing import Generic, ParamSpec, Protocol
+from typing import Generic, ParamSpec, Protocol, TypeVar
 
 from ema_model.errors import InputError, quoted
 from emaviz.text.time_left import going_on
@@ -45,10 +45,32 @@ class Signal(Generic[Values]):
 
 Call = Callable[[], None]
 Steps = Generator[None, None, None]
+Done = TypeVar("Done")
 
 _ATTENDED_S = 0.3  # after a quick job, in which another one is likely: somebody drags a slider
 _STEP_TO_REST = 2.0  # meanwhile, the rest after a long job's step over the time that the step took
 _LONGEST_REST_S = 0.05
+
+
+def elsewhere(work: Callable[[], Done], name: str, look_s: float) -> Generator[None, None, Done]:
+    """Steps, one in so many s, that end with what a thread of its own comes to; what fails there is raised here."""
+    done: list[Done] = []
+    failed: list[BaseException] = []
+
+    def working() -> None:
+        try:
+            done.append(work())
+        except BaseException as error:
+            failed.append(error)
+
+    thread = threading.Thread(target=working, name=name, daemon=True)
+    thread.start()
+    while thread.is_alive():
+        thread.join(look_s)
+        yield
+    if failed:
+        raise failed[0]
+    return done[0]
 
 
 def report(error: BaseException, told: Callable[[str, str], object], title: str) -> None:

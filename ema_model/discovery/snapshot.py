@@ -99,10 +99,6 @@ class Look:
             counted += float(np.sum(self.counts))
         return math.sqrt(squared / counted) if counted else self.rmse
 
-    def share(self, one: Candidate) -> float:
-        """Of χ², that a candidate is predicted to take away, 0 … 1: what it is ranked by."""
-        return min(1.0, max(0.0, one.predicted_drop / self.chi2)) if self.chi2 > 0.0 else 0.0
-
     def uncertainty(self, one: Candidate) -> float | None:
         """Half of the 90 % interval of the first parameter; None where that is no strength.
 

@@ -48,7 +48,7 @@ class Candidate:
     untestable_reason: str = ""
     refitted_drop: float | None = None  # of χ², where it was refitted
     cannot_represent: str = ""  # why the model has no place for it, whatever is recorded
-    probability: float | None = None  # that this, of all candidates or none, is missing; None: not asked
+    probability: float | None = None  # that this, of all candidates or none, is missing; None: ruled out
 
     @property
     def obstacle(self) -> str:

@@ -155,19 +155,23 @@ class Round:
         """How probable each candidate is, of all and none: of what was refitted by that, of the others by algebra."""
         gains = {one.candidate.name: one.gain for one in self.best}
         gains |= {one.trial.candidate.name: one.gain for one in contenders}
-        gains = {name: gain for name, gain in gains.items() if name not in ruled_out}
-        odds = {name: gain + self.prior for name, gain in gains.items()}
+        odds = {name: gain + self.prior for name, gain in gains.items() if name not in ruled_out}
         whole = float(np.logaddexp.reduce([0.0, *odds.values()]))
         return {name: math.exp(one - whole) for name, one in odds.items()}
 
-    def candidates(self, contenders: Sequence[Contender] = ()) -> list[Candidate]:
-        """All candidates, the most probable first, with what their refits gave; what cannot be shown says so."""
+    def candidates(self, contenders: Sequence[Contender] = (), ruled_out: Collection[str] = ()) -> list[Candidate]:
+        """All candidates, the most probable first, with what their refits gave; what cannot be shown says so.
+
+        ruled_out: those that something speaks against, which are not probable, whatever they make of the recordings.
+        """
         drops = {one.trial.candidate.name: one.trial.drop for one in contenders}
-        probable = self.probabilities(contenders)
+        probable = self.probabilities(contenders, ruled_out)
         found = {one.candidate.name: one.candidate for one in self.best}
         found |= {one.name: one for one in self.hidden if one.name not in drops}
         every = [
-            replace(one, refitted_drop=drops.get(name), probability=probable.get(name, 0.0))
+            replace(
+                one, refitted_drop=drops.get(name), probability=None if name in ruled_out else probable.get(name, 0.0)
+            )
             for name, one in found.items()
         ]
         return sorted(every, key=lambda one: -(one.probability or 0.0))
@@ -333,8 +337,10 @@ class Search:
 
     def _added(self) -> bool:
         story, seen, contenders = self.story, self._round(), self._contenders()
-        self._first = self._first or seen.candidates(contenders)
-        named = [one for one in contenders if one.gain + seen.prior > NAMED and not self._objection(one)]
+        beyond = [one for one in contenders if one.gain + seen.prior > NAMED]
+        named = [one for one in beyond if not self._objection(one)]
+        ruled_out = {one.trial.candidate.name for one in beyond} - {one.trial.candidate.name for one in named}
+        self._first = self._first or seen.candidates(contenders, ruled_out)
         if not named:
             return self._turned_back(contenders) and self._added()
         first = _simplest(named)
@@ -355,8 +361,7 @@ class Search:
         story.add(first.trial, ties=[trial.candidate.name for trial in others])
         story.finish(self._tell)
         if not first.trial.faults:
-            beyond = {one.trial.candidate.name for one in contenders if one.gain + seen.prior > NAMED}
-            probable = seen.probabilities(contenders, beyond - {one.trial.candidate.name for one in named})
+            probable = seen.probabilities(contenders, ruled_out)
             story.set_probability(min(1.0, sum(probable[name] for name in as_probable)))
         return True
 

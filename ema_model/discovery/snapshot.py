@@ -63,8 +63,8 @@ class Look:
 
     @property
     def promising(self) -> list[Candidate]:
-        """Candidates that are worth a refit, the best first."""
-        if self.assessment is None:
+        """Candidates that are worth a refit, the best first; none where no more is left than a true model leaves."""
+        if self.assessment is None or self.found.at_floor:
             return []
         return [one for one in self.assessment.candidates if not one.obstacle and self.is_worth(one)]
 
@@ -98,6 +98,10 @@ class Look:
             squared += float(np.sum(self.counts * ((left - change) / self.residuals.sigma[signal]) ** 2))
             counted += float(np.sum(self.counts))
         return math.sqrt(squared / counted) if counted else self.rmse
+
+    def share(self, one: Candidate) -> float:
+        """Of the squared error in floors, that a candidate is predicted to take away, 0 … 1."""
+        return 1.0 - (self.predicted_rmse(one) / self.rmse) ** 2
 
     def uncertainty(self, one: Candidate) -> float | None:
         """Half of the 90 % interval of the first parameter; None where that is no strength.

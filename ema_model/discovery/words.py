@@ -70,7 +70,7 @@ def rung_title(one: Change, axes: Axes) -> str:
     """'+ Cogging torque'."""
     if one.kind in _SIGNS:
         names = [name for name in one.names if name not in BY_NAME or name == cause_of(name)[0]]
-        return f"{_SIGNS[one.kind]} {all_of([effect_title(name) for name in names])}{_of_orders(one, axes)}"
+        return f"{_SIGNS[one.kind]} {all_of([effect_title(name) for name in names])}{_of_orders(one.orders, axes)}"
     if one.kind == "parameter":
         return f"{on_axes(one.names[0], axes).title} freed"
     if one.kind == "replaced":
@@ -97,16 +97,18 @@ def rung_label(one: Change, axes: Axes) -> str:
     if one.names[0] in BY_NAME:
         return f"{_SIGNS[one.kind]} fault {all_of([BY_NAME[name].label for name in one.names])}"
     names = [name if name in CATALOGUE else in_sentence(effect_title(name)) for name in one.names]
-    return f"{_SIGNS[one.kind]} {all_of(names)}{_of_orders(one, axes)}"
+    return f"{_SIGNS[one.kind]} {all_of(names)}{_of_orders(one.orders, axes)}"
 
 
-def _of_orders(one: Change, axes: Axes) -> str:
-    """' of orders 28, 14', or along a linear motor ' of pitches 2.50 mm, 417 µm'."""
-    if not one.orders:
+def _of_orders(orders: Sequence[float], axes: Axes) -> str:
+    """' of orders 28, 14', ' of order 24', or along a linear motor ' of pitches 2.50 mm, 417 µm'; '' of none."""
+    if not orders:
         return ""
+    several = len(orders) > 1
     if axes.motor == "linear":
-        return f" of pitches {', '.join(amount(2.0 * math.pi / order, 'm') for order in one.orders)}"
-    return f" of orders {', '.join(f'{order:g}' for order in one.orders)}"
+        pitches = ", ".join(amount(2.0 * math.pi / order, "m") for order in orders)
+        return f" of {'pitches' if several else 'pitch'} {pitches}"
+    return f" of {'orders' if several else 'order'} {', '.join(f'{order:g}' for order in orders)}"
 
 
 def value(one: Calibrated) -> str:
@@ -306,13 +308,6 @@ def added(found: Discovery) -> Iterator[Facts]:
 _STRAIN_WAVE = 1.0 / 30.0  # gear ratio, from which on a single stage is usually a strain wave gear's
 
 
-def _of_order(one: Added, axes: Axes) -> str:
-    """' of order 24', or along a linear motor ' of pitch 2.50 mm'."""
-    for order in _orders_of(one):
-        return f" of pitch {amount(2.0 * math.pi / order, 'm')}" if axes.motor == "linear" else f" of order {order:g}"
-    return ""
-
-
 def _orders_of(one: Added) -> list[float]:
     return [one.chosen["order"]] if "order" in one.chosen else []
 
@@ -396,17 +391,17 @@ def candidates(found: Discovery) -> Table | None:
     """What each effect or fault alone would take away from χ²; None where none was scored."""
     if not found.candidates:
         return None
+    is_probable = any(one.probability is not None for one in found.candidates)
     rows = [
         [
             effect_title(one.name),
             "–" if one.obstacle else f"{one.predicted_drop:.0f}",
             _refitted(one),
-            *(() if one.probability is None else (in_percent(one.probability),)),
+            *(("–" if one.probability is None else in_percent(one.probability),) if is_probable else ()),
         ]
         for one in found.ranked
     ]
     remarks = [one.obstacle for one in found.ranked]
-    is_probable = found.candidates[0].probability is not None
     head = ("predicted", "refitted", *(("probable",) if is_probable else ()))
     return Table(head, rows, "candidates", remarks, "(fall of χ²)")
 
@@ -589,7 +584,9 @@ class CandidateJson(TypedDict):
     settings: Annotated[dict[str, float | None], Meta(description="its best settings, by the names in files")]
     untestable_reason: Annotated[str, Meta(description="why these recordings cannot show it; empty where they can")]
     cannot_represent: Annotated[str, Meta(description="why this model has no place for it; empty where it has one")]
-    probability: Annotated[float | None, Meta(description="that this, of all candidates or none, is missing")]
+    probability: Annotated[
+        float | None, Meta(description="that this, of all candidates or none, is missing; null: ruled out")
+    ]
 
 
 class UnknownJson(TypedDict):
@@ -1040,7 +1037,7 @@ def sentences(found: Discovery) -> list[str]:
             told.append(f"These recordings cannot tell {in_sentence(effect_title(one.name))} from {rivals}.")
         if one.probability is not None:
             several = sum(other.name == one.name for other in found.effects) > 1
-            order = _of_order(one, found.actuator.axes) if several else ""
+            order = _of_orders(_orders_of(one), found.actuator.axes) if several else ""
             this = "one of these" if one.same_as else f"{in_sentence(effect_title(one.name))}{order}"
             told.append(f"That {this} is missing is {in_percent(one.probability)} probable.")
     if found.parameters_outside_tolerance:

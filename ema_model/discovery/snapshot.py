@@ -37,6 +37,11 @@ class Assessment:
     signatures: Mapping[str, Array]  # (values,) over the floor
     alike: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
 
+    def probability(self, name: str) -> float:
+        """That a candidate is missing, or what looks like it, before any refit."""
+        names = {name, *self.alike.get(name, ())}
+        return min(1.0, sum(one.probability or 0.0 for one in self.candidates if one.name in names))
+
 
 @dataclass(frozen=True, eq=False)
 class Look:
@@ -79,10 +84,8 @@ class Look:
         return one.predicted_drop > WORTH_A_LOOK
 
     def probability(self, one: Candidate) -> float:
-        """That a candidate is missing, or what looks like it, before any refit."""
-        names = {one.name, *(self.assessment.alike.get(one.name, ()) if self.assessment else ())}
-        known = self.assessment.candidates if self.assessment else [one]
-        return min(1.0, sum(other.probability or 0.0 for other in known if other.name in names))
+        """That a candidate is missing, or what looks like it; 0 while the candidates are still being scored."""
+        return self.assessment.probability(one.name) if self.assessment else 0.0
 
     def predicted_rmse(self, one: Candidate) -> float:
         """The error with a candidate in the model, in floors, before any refit."""

@@ -194,13 +194,10 @@ class Telling:
 
     def add(self, trial: Trial, alike: Sequence[str], tell: Tell) -> None:
         """Takes a trial for the next model, fitted to its end; alike: what cannot be told from it."""
-        known = self.known.get(self.story.steps[-1])
+        known = known_of(self.story.steps[-1], self.known)
         self.story.add(trial, ties=alike)
-        if known is not None and not trial.faults:
-            names = {trial.candidate.name, *alike}
-            told = [one.probability or 0.0 for one in known.candidates if one.name in names]
-            if told:
-                self.story.set_probability(min(1.0, sum(told)))
+        if known is not None and trial.candidate.name in known.signatures and not trial.faults:
+            self.story.set_probability(known.probability(trial.candidate.name))
         self.story.finish(tell)
         if self.first and trial.candidate.predicted_drop:
             self.first = with_drops(self.first, [trial])

@@ -63,7 +63,7 @@ class Opinion:
         return left <= BAND or left <= (1.0 if sure else MUCH_BETTER) * last
 
     def settles(self, closed: Story, may_be_faulty: bool) -> bool:
-        """Whether the loop need not be walked on: this explains what flowed to its floor, or so much better.
+        """Whether the loop need not be searched on: this explains what flowed to its floor, or so much better.
 
         So much that the loop may halve its error, and would be given up still.  A drive's own effect beside another
         one is left to the loop, which alone can tell the two; and where the actuator may have a fault, that is the

@@ -70,15 +70,15 @@ def search(
     *,
     candidates: Sequence[str] | None = None,
     most_effects: int = NO_LIMIT,
-    looks: Looks | None = None,
+    rounds: Rounds | None = None,
 ) -> Found:
     """Goes on by itself from where a story stands: adds what is missing, takes out what is not, draws what is unknown.
 
     Where a closed loop is left unexplained, inverse dynamics is asked as well, and takes over if the controller is to
     blame, or if the loop names nothing, or little of what is left.  tell is told after each step, too, and may raise
-    to stop; the story then stands at its last whole step.  looks: those that were taken at this story before.
+    to stop; the story then stands at its last whole step.  rounds: those of this story that are known.
     """
-    own = Search(story, candidates, most_effects, tell, looks)
+    own = Search(story, candidates, most_effects, tell, rounds)
     beside = _Beside(story, tell, candidates, most_effects)
     left = max(FAR, LOOP_TOLD * ratio(story.data, story.base))
     # A loop whose drive is another one is searched in vain; one that lacks a limit, which is not straight, tells so
@@ -177,8 +177,8 @@ class Round:
         return sorted(every, key=lambda one: -(one.probability or 0.0))
 
 
-class Looks:
-    """What was seen beside the models of a story, the last of them once; it may outlast a search."""
+class Rounds:
+    """Rounds beside the models of a story, the last one kept; it may outlast a search."""
 
     def __init__(self, candidates: Sequence[str] | None = None) -> None:
         self._names = candidates
@@ -233,11 +233,11 @@ class Search:
         candidates: Sequence[str] | None = None,
         most_effects: int = NO_LIMIT,
         tell: Progress = lambda text: None,
-        looks: Looks | None = None,
+        rounds: Rounds | None = None,
     ) -> None:
         self.story, self._tell = story, tell
         self._names, self._most = candidates, most_effects
-        self._looks = looks or Looks(candidates)
+        self._rounds = rounds or Rounds(candidates)
         self._first: list[Candidate] = []
         self._rivals: list[Trial] = []
         self._curve: Trial | None = None
@@ -298,7 +298,7 @@ class Search:
 
     def _round(self) -> Round:
         """All Terms beside the last model."""
-        return self._looks.beside(self.story, self._tell)
+        return self._rounds.beside(self.story, self._tell)
 
     def _contenders(self) -> list[Contender]:
         """The few Terms that might be the best beside the last model, refitted, the most probable first."""

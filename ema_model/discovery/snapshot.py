@@ -15,7 +15,7 @@ from ema_model.discovery.criteria import WORTH_A_LOOK
 from ema_model.discovery.history import Step, Story
 from ema_model.discovery.remaining import Left
 from ema_model.discovery.result import Added, Candidate, Discovery
-from ema_model.discovery.search import Looks
+from ema_model.discovery.search import Rounds
 from ema_model.discovery.words import primary
 from ema_model.effects import find
 from ema_model.faults import BY_NAME, causes
@@ -144,12 +144,12 @@ class Look:
         return np.concatenate(parts) if parts else None
 
 
-def assessed(story: Story, looks: Looks | None = None) -> Assessment:
+def assessed(story: Story, rounds: Rounds | None = None) -> Assessment:
     """What the last model of a story leaves; takes a second or two, and the first time a compilation.
 
-    looks: those that were taken at earlier models of it.
+    rounds: those of it that are known.
     """
-    left, seen = story.left(), (looks or Looks()).beside(story)
+    left, seen = story.left(), (rounds or Rounds()).beside(story)
     candidates = seen.candidates()
     changes = {one.candidate.name: one.change for one in seen.best if one.change is not None}
     worth = {one.name for one in candidates if not one.obstacle and one.predicted_drop > _RIVAL}

@@ -340,7 +340,7 @@ class Discovering:
                 if self._shown.is_behind:
                     self._shown.show(told)  # a step further: the ladder grows
 
-            search(told.story, say, looks=told.looks)
+            search(told.story, say, rounds=told.rounds)
             self._shown.assess(told, tell)
 
         return self.job.begin("Finding all that is missing", job)

@@ -19,7 +19,7 @@ from ema_model.discovery import Candidate, Story, begun, result_of
 from ema_model.discovery.history import Step
 from ema_model.discovery.refit import Trial, with_drops
 from ema_model.discovery.result import Experiment
-from ema_model.discovery.search import Looks
+from ema_model.discovery.search import Rounds
 from ema_model.discovery.snapshot import Assessment, Look, assessed, known_of, look_at
 from ema_model.discovery.words import effect_title
 from ema_model.effects import CATALOGUE, catalogue_name
@@ -178,7 +178,7 @@ class Telling:
     recipe: Recipe  # of its recordings
     known: dict[Step, Assessment] = field(default_factory=dict)  # so that a step back is at once
     trials: Trials = field(default_factory=Trials)  # so that nothing is fitted twice
-    looks: Looks = field(default_factory=Looks)  # at its models
+    rounds: Rounds = field(default_factory=Rounds)  # beside its models
     first: Sequence[Candidate] = ()  # of the first search, with what their refits gave
     experiment: Experiment | None = None
 
@@ -189,7 +189,7 @@ class Telling:
 
     def assess(self) -> None:
         """Looks at what the last model leaves; takes a second, and the first time a compilation."""
-        found = self.known[self.story.steps[-1]] = assessed(self.story, self.looks)
+        found = self.known[self.story.steps[-1]] = assessed(self.story, self.rounds)
         self.first = self.first or found.candidates
 
     def add(self, trial: Trial, alike: Sequence[str], tell: Tell) -> None:

@@ -7,6 +7,7 @@ import os
 import threading
 import uuid
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import suppress
 from pathlib import Path
 from types import TracebackType
 from typing import Any
@@ -19,6 +20,7 @@ from numpy.typing import ArrayLike, NDArray
 from rerun.chunk import Chunk, RrdReader
 from rerun.error_utils import catch_and_log_exceptions
 
+from ema_model.files.written import whole_file
 from ema_model.identification.run import algorithm_title
 from ema_model.text import Block, Facts, Lines, Note, Remarks
 from emaviz.recording import blueprint, style
@@ -137,20 +139,16 @@ class RrdFile:
         size = self.part.stat().st_size
         if size > _LARGEST_TO_ORDER or free_bytes(self.path.parent) < size + self._min_free_bytes // 10:
             return
-        ordered = self.part.with_suffix(".ordered")
-        try:
-            with catch_and_log_exceptions(strict=True):
-                reader = RrdReader(self.part)
-                chunks = sorted(reader.stream().to_chunks(), key=_place)
-                stream = _new_stream(reader.recordings()[0].recording_id, send_properties=False)
-                stream.save(ordered)
-                send(stream, layout)
-                stream.send_chunks(chunks)
-                stream.flush(timeout_sec=_FLUSH_TIMEOUT_S)
-                stream.disconnect()
-            os.replace(ordered, self.part)
-        except Exception:  # rerun has many, and the part is whole
-            ordered.unlink(missing_ok=True)
+        # Rerun has many errors, and the part is whole.
+        with suppress(Exception), whole_file(self.part) as ordered, catch_and_log_exceptions(strict=True):
+            reader = RrdReader(self.part)
+            chunks = sorted(reader.stream().to_chunks(), key=_place)
+            stream = _new_stream(reader.recordings()[0].recording_id, send_properties=False)
+            stream.save(ordered)
+            send(stream, layout)
+            stream.send_chunks(chunks)
+            stream.flush(timeout_sec=_FLUSH_TIMEOUT_S)
+            stream.disconnect()
 
 
 def _place(chunk: Chunk) -> int:

@@ -49,7 +49,8 @@ from ema_model.side_by_side import fits
 
 Progress = Callable[[str], None]
 
-_REFITTED = 4  # Terms of a round
+_REFITTED = 4  # Terms of a round that nothing speaks against
+_MOST_REFITTED = 8  # Terms of a round
 _MADE_ANEW = 32  # Terms beside a further model, by what those of the first one tell beside it
 _APART = 0.5  # orders, closer than which two are one
 NO_LIMIT = 100  # of effects
@@ -243,6 +244,7 @@ class Search:
         self._curve: Trial | None = None
         self._going = True
         self._refitted: tuple[Round, list[Contender]] | None = None
+        self._objections: dict[Contender, str] = {}  # to contenders, by identity
         self._exchanges: set[tuple[str, str]] = set()  # that were tried
         self._barred: set[str] = set()  # effects that were added, and spoken against once all was there
 
@@ -308,17 +310,26 @@ class Search:
             room = [one for one in self._open(seen) if one.term.fingerprint is None or not is_full]
             might = 0.0 if self._is_far() else MIGHT  # so far off, what is straight tells little
             found: list[Contender] = []
+            standing: list[Contender] = []  # those that nothing speaks against
             best = -math.inf
-            while len(found) < _REFITTED:
+            while (
+                len(standing) < _REFITTED and len(found) < _MOST_REFITTED and not within_band(story.data, story.current)
+            ):
                 left = [one for one in room[len(found) :] if one.gain > max(WORTH_A_REFIT, best)]
-                chosen = [one for one in left if one.gain > might * left[0].gain][: _REFITTED - len(found)]
+                chosen = [one for one in left if one.gain > might * left[0].gain][: _REFITTED - len(standing)]
                 if not chosen:
                     break
                 trials = fits(self._refit, chosen, self._tell)
                 found += [seen.contender(story.data, story.held, one, trial) for one, trial in zip(chosen, trials)]
-                best = max(one.gain for one in found)  # what promises more than this is refitted, too
+                standing = [one for one in found if not (self._is_beyond(one) and self._objection(one))]
+                # What promises more than this is refitted, too.
+                best = max((one.gain for one in standing), default=-math.inf)
             self._refitted = seen, sorted(found, key=lambda one: -one.gain)
         return self._refitted[1]
+
+    def _is_beyond(self, one: Contender | ScoredTerm) -> bool:
+        """Whether a Term is so probable that it is named, if nothing speaks against it."""
+        return one.gain + self._round().prior > NAMED
 
     def _open(self, seen: Round) -> list[ScoredTerm]:
         """The Terms of a round that may be added, the most probable first."""
@@ -337,9 +348,11 @@ class Search:
 
     def _added(self) -> bool:
         story, seen, contenders = self.story, self._round(), self._contenders()
-        beyond = [one for one in contenders if one.gain + seen.prior > NAMED]
-        named = [one for one in beyond if not self._objection(one)]
-        ruled_out = {one.trial.candidate.name for one in beyond} - {one.trial.candidate.name for one in named}
+        named = [one for one in contenders if self._is_beyond(one) and not self._objection(one)]
+        beyond = {one.trial.candidate.name for one in contenders if self._is_beyond(one)}
+        if within_band(story.data, story.current):  # beside what leaves no more than a true model, nothing is missing
+            beyond |= {one.candidate.name for one in seen.best if self._is_beyond(one)}
+        ruled_out = beyond - {one.trial.candidate.name for one in named}
         self._first = self._first or seen.candidates(contenders, ruled_out)
         if not named:
             return self._turned_back(contenders) and self._added()
@@ -365,11 +378,18 @@ class Search:
             story.set_probability(min(1.0, sum(probable[name] for name in as_probable)))
         return True
 
-    def _objection(self, one: Contender) -> bool:
-        """Whether a value that no such part has, or another one in each recording, speaks against a contender.
+    def _objection(self, one: Contender) -> str:
+        """What speaks against a contender, "" if nothing does: a value that no such part has, or recordings disagree.
 
         Beside what else is missing, recordings may ask for another value each: it counts at the floor, and at the end.
         """
+        if one not in self._objections:
+            self._objections[one] = reason = self._spoken_against(one)
+            if reason:
+                self.story.refused[one.trial.candidate.name] = reason
+        return self._objections[one]
+
+    def _spoken_against(self, one: Contender) -> str:
         story, found = self.story, one.trial.fit
         reason = "" if found.calibration.converged else "the fit with it did not converge"
         for key in one.trial.effects:
@@ -377,16 +397,12 @@ class Search:
             reason = reason or implausible(found, key) or self._idle(found) or self._denied(one)
             if not reason and at_floor(story.data, found):
                 reason = unsteady(story.data, found, key)
-        if reason:
-            story.refused[one.trial.candidate.name] = reason
-        return bool(reason)
+        return reason
 
     def _idle(self, found: Fit) -> str:
         """Whether the error that is told does not fall: a verdict says no more than its ladder."""
         data, current = self.story.data, self.story.current
         first, last = (floor_ratio(data, one.plant, one.calibration.signals) for one in (current, found))
-        if within_band(data, current):
-            return "without it no more is left than a true model leaves"
         return "" if last < (1.0 - LEAST_FALL) * first else "the error does not fall with it"
 
     def _denied(self, one: Contender) -> str:

@@ -210,7 +210,7 @@ def _states(axes: Axes) -> dict[str, tuple[str, str]]:
         "speed_error": (axes.unit("rad/s", MOTOR), "of the step before"),
         "user": (user, "where the user stands"),
         "told": (user, "what the position sensor tells of it"),
-        "begun": ("", "0 before the drive's first step, then 1"),
+        "begun": ("", "0 before the drive's first step, then 1; −1 where it has followed its command before it"),
         "time": ("s", "since the start"),
         "demand": ("", "what the drive asks for"),
         "left": ("s", "of the step in which the rotor came to rest"),

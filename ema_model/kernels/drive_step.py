@@ -8,6 +8,7 @@ to the last bit, and is left out (`is_driven`).
 from __future__ import annotations
 
 from ema_model.physics.controller import advance_speed_loop, speed_reference
+from ema_model.physics.elementary import clamp
 from ema_model.physics.jit import scalar
 from ema_model.physics.rows import (
     BEGUN,
@@ -74,9 +75,10 @@ def advance_drive(s, first, p, i, command, told, omega, supply, dt):
 
     supply: the bus voltage over its nominal value; switched off, the speed loop's integral forgets.
     """
-    begins = s[BEGUN * LANES + i] == 0.0
+    begun = s[BEGUN * LANES + i]
+    begins = begun <= 0.0
     limit = p[SPEED_LIMIT * LANES + i]
-    wished = goal(command, p[GEAR_RATIO * LANES + i], begins, dt, s, first, p, i)
+    wished = goal(command, p[GEAR_RATIO * LANES + i], begun == 0.0, dt, s, first, p, i)
     error = position_error(wished - told, begins, dt, s, first, p, i)
     read = speed_sample(speed_reading(omega, begins, dt, s, first, p, i), begins, dt, s, first, p, i)
     position_gain = p[POSITION_GAIN * LANES + i]
@@ -85,6 +87,12 @@ def advance_drive(s, first, p, i, command, told, omega, supply, dt):
     gain = speed_gain(p[SPEED_GAIN * LANES + i], s, first, p, i)
     current_per_torque = p[CURRENT_PER_TORQUE * LANES + i]
     most = p[OUTPUT_LIMIT * LANES + i]
+    if begins:
+        given = s[INTEGRAL * LANES + i]
+        if begun < 0.0:  # for the plain loop, as what makes it ask for the torque that is there
+            plain = speed_reference(command - told, position_gain, limit) - omega
+            given += p[SPEED_GAIN * LANES + i] * plain - gain * speed_error
+        s[INTEGRAL * LANES + i] = clamp(given, -most / current_per_torque, most / current_per_torque)
     remembered, integral = advance_speed_loop(
         error,
         speed_error,
@@ -108,3 +116,10 @@ def advance_drive(s, first, p, i, command, told, omega, supply, dt):
     s[SPEED_ERROR * LANES + i] = speed_error
     s[BEGUN * LANES + i] = 1.0
     return current_reference(put_out, begins, dt, s, first, p, i)
+
+
+@scalar
+def follow(s, first, p, i, command, dt):
+    """A step of dt, s, before a start in mid-run: the goal that the drive makes of its command goes on, and no more."""
+    goal(command, p[GEAR_RATIO * LANES + i], s[BEGUN * LANES + i] == 0.0, dt, s, first, p, i)
+    s[BEGUN * LANES + i] = -1.0

@@ -12,8 +12,8 @@ import numpy as np
 from ema_model.physics.jit import kernel, parallel_kernel
 from ema_model.physics.rows import LANES, TOLD
 
-from .drive_step import is_driven
-from .monitor_step import advance, advance_demand, sense, shown_angle, shown_current, shown_speed
+from .drive_step import follow, is_driven
+from .monitor_step import FIRST, advance, advance_demand, sense, shown_angle, shown_current, shown_speed
 
 
 @parallel_kernel
@@ -64,10 +64,11 @@ def squared_errors(
 
 
 @kernel
-def traces(states, parameters, command, load, supply, period, group, dt, result):
+def traces(states, parameters, before, command, load, supply, period, group, dt, result):
     """Signals of a population over one run, each value the mean of `group` samples of `period` steps.
 
     result: (blocks, values, 4, LANES), written here; states: left as they are at the end.
+    before: commands that came before the start, a value per step, which the drive has followed.
     A sample of the current is its mean over the period; one of motor speed, motor angle and user position
     is taken at the period's end.
     """
@@ -75,6 +76,10 @@ def traces(states, parameters, command, load, supply, period, group, dt, result)
         s = states[block].copy()  # of its own, which proves to the compiler that nothing overlaps
         p = parameters[block]
         driven = is_driven(p)
+        if driven:
+            for step in range(len(before)):
+                for i in range(LANES):
+                    follow(s, FIRST, p, i, before[step], dt)
         for i in range(LANES):
             sense(s, p, i)
         total = np.empty(4 * LANES)

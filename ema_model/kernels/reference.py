@@ -7,22 +7,36 @@ from __future__ import annotations
 
 import numpy as np
 
-from ema_model.physics.jit import kernel
+from ema_model.physics.jit import kernel, scalar
 from ema_model.physics.rows import BUS_VOLTAGE, GEAR_RATIO, LANES, VOLTAGE_RATIO
 
 from .composition import current_reading, motor_angle_reading, motor_speed_reading, position_reading, user_position
-from .drive_step import is_driven
+from .drive_step import follow, is_driven
 from .reference_step import CONSTANT, FIRST, STATE, advance, advance_demand, begun, constants
 
 RUNS = 16  # at once: 8 do not vectorise, 32 take twice as long
 
 
+@scalar
+def follow_all(s, p, lanes, before, then, substeps, dt):
+    """The drives of some lanes follow the commands before the start, linear between them and up to the one `then`."""
+    for interval in range(len(before)):
+        demand = before[interval]
+        after = before[interval + 1] if interval + 1 < len(before) else then
+        demand_step = (after - demand) / substeps
+        for _ in range(substeps):
+            for i in range(lanes):
+                follow(s, FIRST, p, i, demand, dt)
+            demand += demand_step
+
+
 @kernel
-def run(state, p, command, load, period, substeps, dt, result):
+def run(state, p, before, command, load, period, substeps, dt, result):
     """One run of the Reference Model from a state (rows of `REFERENCE_STATE_ROWS`, lane 0).
 
     command, load: a value per `substeps` steps of dt, linear between them (one more value than there are
     intervals); period: intervals per sample.
+    before: commands that came before the start, likewise, which the drive has followed.
     result: (samples, 11), written here: equivalent current (mean over the sample's period), motor speed,
     motor angle, user position (at its end), phase currents, motor torque and leg voltages (means).
     """
@@ -30,6 +44,8 @@ def run(state, p, command, load, period, substeps, dt, result):
     x = begun(s, 0)
     constant = constants(s, p, 0)
     driven = is_driven(p)
+    if driven:
+        follow_all(s, p, 1, before, command[0], substeps, dt)
     tau = p[GEAR_RATIO * LANES]
     voltage = p[VOLTAGE_RATIO * LANES] * p[BUS_VOLTAGE * LANES]
     scale = 1.0 / (period * substeps)
@@ -72,14 +88,16 @@ def run(state, p, command, load, period, substeps, dt, result):
 
 
 @kernel
-def runs(state, p, command, load, period, substeps, dt, result):
+def runs(state, p, before, command, load, period, substeps, dt, result):
     """RUNS runs under one command, each under a constant load: what of `run` is compared, (samples, 4, RUNS).
 
-    state, p: rows of LANES, of which the first RUNS are simulated; command: as of `run`; load: (RUNS,).
+    state, p: rows of LANES, of which the first RUNS are simulated; before, command: as of `run`; load: (RUNS,).
     result: written here: equivalent current, motor speed, motor angle, user position.
     """
     s = state.copy()
     driven = is_driven(p)
+    if driven:
+        follow_all(s, p, RUNS, before, command[0], substeps, dt)
     kept = np.empty(CONSTANT * RUNS)
     x = np.empty(STATE * RUNS)
     mean = np.empty(RUNS)

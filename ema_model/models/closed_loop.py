@@ -28,7 +28,7 @@ from ema_model.recordings.noise import least_noise, sample_noise
 from ema_model.simulation.compiled import own_stack, stack_at_hand
 from ema_model.simulation.pack import initial_state, monitor_rows
 from ema_model.simulation.plant import simulate_references
-from ema_model.simulation.run import Run, simulate_reference, traced
+from ema_model.simulation.run import Run, reference_steps, simulate_reference, traced
 
 Array = NDArray[np.float64]
 
@@ -130,6 +130,7 @@ class ClosedLoop:
             start_play_rad=window.play_rad,
             start_integral_Nm=float(window.integral_Nm(actuator, k)),
             start_time_s=window.begins_s,
+            before=_before(window, run),
         )
         measured = self._measured(window, actuator, {name: shown[name][None, 1:] for name in COMPARED})
         return {name: values[0] for name, values in measured.items()}
@@ -150,10 +151,12 @@ class ClosedLoop:
         if not actuator.has_reference_model:
             return {}
         load, others = _load_and_others(window, effects)
+        rate_Hz = 1.0 / (window.steps_per_sample * window.step_s)
+        samples = len(window.command) // window.steps_per_sample
         shown = simulate_references(
             _command(window),
-            len(window.command) // window.steps_per_sample,
-            1.0 / (window.steps_per_sample * window.step_s),
+            samples,
+            rate_Hz,
             actuator,
             k,
             others,
@@ -163,6 +166,7 @@ class ClosedLoop:
             start_play_rad=window.play_rad + np.asarray(play_rad),
             start_integral_Nm=window.integral_Nm(actuator, k, turned_rad, play_rad),
             start_time_s=window.begins_s,
+            before=_before(window, Run(_command(window), samples / rate_Hz, rate_Hz)),
         )
         return self._measured(window, actuator, shown)
 
@@ -239,7 +243,8 @@ class ClosedLoop:
             at = slice(part.start * steps, part.stop * steps)
             run = window.command[at], window.load[at], window.supply[at]
             period, group = window.steps_per_sample, window.samples_per_block
-            result = traced(self.stack, state, rows, run, period, group, window.step_s)
+            before = window.before if first == 0 else window.before[:0]
+            result = traced(self.stack, state, rows, run, period, group, window.step_s, before)
             for block, shown in enumerate(result):
                 ours = lanes[:, block * LANES : (block + 1) * LANES, part]
                 ours[...] = shown.transpose(1, 2, 0)[:, : ours.shape[1]]
@@ -265,6 +270,15 @@ class ClosedLoop:
 def _command(window: LoopWindow) -> Recorded:
     """What a window's model is told, at its steps."""
     return Recorded(np.arange(len(window.command)) * window.step_s, window.command)
+
+
+def _before(window: LoopWindow, run: Run) -> Array:
+    """What the drive was told before a window, at the steps at which the Reference Model of a run is told it."""
+    dt = reference_steps(run)[2]
+    lead_s = len(window.before) * window.step_s
+    at = np.arange(round(lead_s / dt)) * dt
+    told = np.append(window.before, window.command[0])
+    return np.interp(at, np.arange(len(told)) * window.step_s, told)
 
 
 def _load_and_others(window: LoopWindow, effects: Effects) -> tuple[Array, Effects]:

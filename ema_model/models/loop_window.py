@@ -22,6 +22,8 @@ from ema_model.simulation.run import steps_per_sample
 
 Array = NDArray[np.float64]
 
+_BESIDE = 20  # samples behind a time, that tell how a command goes there
+_FOLLOWED_S = 0.5  # before a start in mid-run: what a drive's goal still remembers
 COMPARED = ("current_A", "motor_speed_rad_s", "motor_position_rad", "user_position_rad")
 _SLOPE_SAMPLES = 10  # on either side of a start in mid-run, over which the speed is found
 _COARSE_S = 0.01  # the same of the user's encoder, which is coarse beside a motor's
@@ -34,6 +36,7 @@ class LoopWindow(Window):
     """A window with its inputs, (steps,), and its start; measured are block means of `COMPARED`, as recorded."""
 
     command: Array  # rad; in an open loop A, N·m, V or a share of the bus voltage
+    before: Array  # the same up to the window's start, (earlier steps,): what its drive has followed
     input: str  # the signal that it is of, by its name inside
     load: Array  # N·m at the user
     supply: Array  # bus voltage over nominal, or in an open loop in V; 0 where the drive is off
@@ -62,7 +65,9 @@ class LoopWindow(Window):
         steps = self.steps_per_sample
         times = max(n for n in range(1, steps + 1) if steps % n == 0 and (n == 1 or n * self.step_s <= most_s + 1e-12))
         # in one piece, as at the own step: a kernel is compiled anew for an array that is not
-        inputs = {name: np.ascontiguousarray(getattr(self, name)[::times]) for name in ("command", "load", "supply")}
+        inputs = {
+            name: np.ascontiguousarray(getattr(self, name)[::times]) for name in ("before", "command", "load", "supply")
+        }
         return replace(self, **inputs, steps_per_sample=steps // times, step_s=self.step_s * times)
 
     @property
@@ -115,6 +120,7 @@ def cut(
                 first=run.start,
                 time_s=means("time_s"),
                 command=inputs[0],
+                before=_before(measurement, actuator, run, steps, step_s),
                 input=put_in,
                 load=inputs[1],
                 supply=inputs[2],
@@ -194,6 +200,16 @@ def _inputs(
         held = np.clip(np.searchsorted(time, at, side="right") - 1, 0, time.size - 1)
         supply = np.where(enabled[run][held] > 0.5, supply, 0.0)
     return command, loads, supply
+
+
+def _before(measurement: Measurement, actuator: Actuator, run: slice, steps: int, step_s: float) -> Array:
+    """What a drive that follows its command was told before a stretch, at every step."""
+    if actuator.controller.kind == "open":
+        return np.zeros(0)
+    whole = next(one for one in measurement.runs if one.start <= run.start < one.stop)
+    first = max(whole.start, run.start - round(_FOLLOWED_S / measurement.sample_period_s))
+    lead, last = (run.start - first) * steps, min(whole.stop, run.start + _BESIDE)
+    return _put_in(measurement, "command_rad", first, last, lead, step_s, actuator.sensors.delay_s)
 
 
 @lru_cache(maxsize=8)  # every model of a discovery is put beside the same recordings

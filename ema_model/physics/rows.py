@@ -103,7 +103,7 @@ STATE_ROWS = (
     "speed_error",  # e of the step before, rad/s
     "user",  # where the user stands, rad
     "told",  # what the position sensor tells of it, rad
-    "begun",  # 0 before the drive's first step, then 1
+    "begun",  # 0 before the drive's first step, then 1; −1 where it has followed its command before it
     "time",  # since the recording's start, s
     "demand",  # what the drive asks for in this step, where more than the plain cascade acts: A, or a share of the bus
     "left",  # of the step in which the rotor came to rest, s

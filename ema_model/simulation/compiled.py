@@ -164,7 +164,7 @@ def compile_here(stack: Stack, kernel: str) -> None:
     if kernel == "traces":
         state = initial_state(actuator, len(rows), stack=stack)
         result = np.empty((len(rows), 1, 4, LANES))
-        stack.monitor.traces(state, rows, samples, samples, samples, 1, 1, actuator.step_s, result)
+        stack.monitor.traces(state, rows, samples, samples, samples, samples, 1, 1, actuator.step_s, result)
     elif kernel == "currents":
         result = np.empty((len(rows), 1, LANES))
         stack.inverse.currents(rows, samples, samples, samples, samples, samples, 1.0, result)
@@ -172,10 +172,10 @@ def compile_here(stack: Stack, kernel: str) -> None:
         rows = reference_rows(actuator, HEALTHY, stack, {})
         state, pair = initial_reference_state(actuator, stack=stack), np.zeros(2)
         if kernel == "run":
-            stack.reference.run(state, rows, pair, pair, 1, 1, 1e-6, np.empty((1, 11)))
+            stack.reference.run(state, rows, pair, pair, pair, 1, 1, 1e-6, np.empty((1, 11)))
         else:
             lanes = stack.reference.RUNS
-            stack.reference.runs(state, rows, pair, np.zeros(lanes), 1, 1, 1e-6, np.empty((1, 4, lanes)))
+            stack.reference.runs(state, rows, pair, pair, np.zeros(lanes), 1, 1, 1e-6, np.empty((1, 4, lanes)))
 
 
 if __name__ == "__main__":

@@ -133,20 +133,19 @@ def integral_at_start(
 ) -> Array:
     """K_I ∫e dt, N·m, of a speed loop that is caught at work: what makes it ask for the current that flows.
 
-    k_t I − K_P (ω_ref − ω), within the torque of the current's limit, for k (n, 8) or (8,) → (n,) or ().  A speed loop
-    without an integral action passes it by: its gain may be an effect's.  It is the bumpless start of Åström and
-    Hägglund (Advanced PID Control, ISA 2006), and steady state where the recording begins in steady state.
+    k_t I − K_P (ω_ref − ω), which the drive keeps within the torque of its current's limit, for k (n, 8) or (8,)
+    → (n,) or ().  A speed loop without an integral action passes it by: its gain may be an effect's.  It is the
+    bumpless start of Åström and Hägglund (Advanced PID Control, ISA 2006), and steady state where the recording begins
+    in steady state.  It is of the plain loop; a drive that does more makes its own of it (`advance_drive`).
     """
     controller = actuator.controller
     if controller.kind != "cascade":
         return np.zeros(())
     gain = controller.position_gain_1_s * faults.physical(k).gain_factor
     limit = np.asarray(controller.speed_limit_rad_s, dtype=float)
-    most = controller.torque_constant_Nm_A * np.asarray(actuator.current_limit_A)
     with np.errstate(invalid="ignore"):  # a k that is no number is one lane's matter
         error = np.clip(gain * (command_rad - np.asarray(user_rad)), -limit, limit) - np.asarray(speed_rad_s)
-        torque = controller.torque_constant_Nm_A * np.asarray(current_A) - controller.speed_gain_Nms_rad * error
-        return np.clip(torque, -most, most)
+        return controller.torque_constant_Nm_A * np.asarray(current_A) - controller.speed_gain_Nms_rad * error
 
 
 def _state(

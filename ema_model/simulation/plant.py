@@ -18,6 +18,7 @@ from ema_model.simulation import compiled
 from ema_model.simulation.compiled import library_stack, own_stack, stack_at_hand, wait_for
 from ema_model.simulation.pack import EffectSettings, initial_reference_state, reference_rows
 from ema_model.simulation.run import (
+    NOTHING,
     REFERENCE_SUBSTEPS,
     Run,
     finite,
@@ -47,6 +48,7 @@ def simulate_references(
     start_play_rad: ArrayLike,
     start_integral_Nm: ArrayLike,
     start_time_s: float = 0.0,
+    before: Array = NOTHING,
 ) -> dict[str, Array]:
     """Signals of `SHOWN` after the start, for k (n, 8): (n, samples) each, as `simulate_reference` gives for one.
 
@@ -67,6 +69,7 @@ def simulate_references(
             actuator, start_rad, start_speed_rad_s, start_play_rad, stack, start_integral_Nm, start_time_s
         ),
         reference_rows(actuator, k, stack, effects),
+        before,
         command.at(times),
         np.pad(load, (0, lanes - len(k)), mode="edge"),
         period,

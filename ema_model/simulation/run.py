@@ -110,6 +110,7 @@ def run_in_words(command: str, settings: Mapping[str, float], duration_s: float,
 # The Monitor Model's and inverse dynamics' kernels called for a population, its blocks of lanes side by side.
 
 AnyFloat = NDArray[np.floating]
+NOTHING = np.zeros(0)
 
 
 def traced(
@@ -120,17 +121,18 @@ def traced(
     period: int,
     group: int,
     step_s: float,
+    before: AnyFloat = NOTHING,
 ) -> Array:
     """The four signals of `monitor.traces`: (blocks, values, 4, LANES).
 
-    run: command, load and supply at each step.  state and rows: a block of lanes each; state is left as it is at the
-    end.
+    run: command, load and supply at each step; before: the command at those before the start.  state and rows: a block
+    of lanes each; state is left as it is at the end.
     """
     wait_for(stack, "traces")
     result = np.empty((len(rows), len(run[0]) // (period * group), 4, LANES))
 
     def simulate(part: slice) -> None:
-        stack.monitor.traces(state[part], rows[part], *run, period, group, step_s, result[part])
+        stack.monitor.traces(state[part], rows[part], before, *run, period, group, step_s, result[part])
 
     blocks(simulate, len(rows))
     return result
@@ -244,13 +246,14 @@ def simulate_reference(
     start_play_rad: float = 0.0,
     start_integral_Nm: float = 0.0,
     start_time_s: float = 0.0,
+    before: Array = NOTHING,
     voltages: bool = False,
 ) -> Measurement:
     """The three-phase Reference Model's signals; with `voltages`, also the legs' (V, against the bus's middle).
 
     k: without it, the actuator's own.  It starts at start_rad, a user's angle, or where the command starts; with a
     motor speed, at a place in the play (rad at the motor), with a speed loop's integral action, and so long after the
-    recording's start, all 0 unless given.
+    recording's start, all 0 unless given.  before: commands up to there, of `reference_steps`, that the drive followed.
     Raises InputError for settings of effects that do not exist, FloatingPointError if the model diverges.
     """
     effects = {name: find(name, actuator.axes).settings(dict(given)) for name, given in (effects or {}).items()}
@@ -271,6 +274,7 @@ def simulate_reference(
             actuator, start, start_speed_rad_s, start_play_rad, stack, start_integral_Nm, start_time_s
         ),
         reference_rows(actuator, actuator.k if k is None else k, stack, effects),
+        before,
         demand,
         load,
         period,

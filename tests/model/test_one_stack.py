@@ -24,7 +24,7 @@ from ema_model.simulation import compiled as compiled_simulation
 from ema_model.simulation.compiled import LIBRARY, is_compiled, library_stack, own_stack, stack_at_hand
 from ema_model.simulation.pack import initial_reference_state, initial_state, monitor_rows, reference_rows
 from ema_model.simulation.plant import simulated
-from ema_model.simulation.run import Run
+from ema_model.simulation.run import NOTHING, Run
 from ema_model.stacks import Stack
 
 ACTUATOR = load_actuator()
@@ -85,7 +85,7 @@ def monitored(stack: Stack, effects: Effects, demand: np.ndarray, k: np.ndarray)
     result = np.empty((len(rows), STEPS // PER_VALUE, 4, LANES))
     load, supply = np.full(STEPS, LOAD_NM), np.ones(STEPS)
     state = initial_state(ACTUATOR, len(rows), stack=stack)
-    stack.monitor.traces(state, rows, demand, load, supply, PER_VALUE, 1, STEP_S, result)
+    stack.monitor.traces(state, rows, NOTHING, demand, load, supply, PER_VALUE, 1, STEP_S, result)
     return result.transpose(2, 0, 3, 1).reshape(4, -1, STEPS // PER_VALUE)[:, : len(k)]
 
 
@@ -94,7 +94,7 @@ def referred(stack: Stack, effects: Effects, demand: np.ndarray) -> np.ndarray:
     result = np.empty(((STEPS - 1) // 10, 11))
     rows = reference_rows(ACTUATOR, HEALTHY, stack, effects)
     state = initial_reference_state(ACTUATOR, stack=stack)
-    stack.reference.run(state, rows, demand, np.full(STEPS, LOAD_NM), 10, 10, 1e-6, result)
+    stack.reference.run(state, rows, NOTHING, demand, np.full(STEPS, LOAD_NM), 10, 10, 1e-6, result)
     return result.T
 
 

@@ -27,7 +27,7 @@ from ema_model.faults import HEALTHY
 from ema_model.physics.rows import LANES
 from ema_model.simulation.compiled import library_stack
 from ema_model.simulation.pack import initial_state, monitor_rows
-from ema_model.simulation.run import Run, simulate_monitor
+from ema_model.simulation.run import NOTHING, Run, simulate_monitor
 
 THESIS = load_actuator()
 GEAR = THESIS.transmission.gear_ratio
@@ -247,7 +247,7 @@ def lanes(effects, count: int, actuator):
     result = np.empty((len(rows), steps // 20, 4, LANES))
     state = initial_state(actuator, len(rows), stack=stack)
     fixed = (demand, np.full(steps, 5.0), np.ones(steps), 20, 1, DT)
-    stack.monitor.traces(state, rows, *fixed, result)
+    stack.monitor.traces(state, rows, NOTHING, *fixed, result)
     return result.transpose(0, 3, 1, 2).reshape(-1, steps // 20, 4)[:count]
 
 

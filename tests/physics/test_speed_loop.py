@@ -164,6 +164,34 @@ def test_a_stretch_from_the_middle_goes_on_as_the_whole_did(first, monkeypatch):
     assert np.all(balanced < 0.2 * errors()), "an integral that starts at 0 must be told from one that goes on"
 
 
+FOLLOWED = {
+    "velocity_feedforward": {"ratio": 0.7},
+    "goal_rate_limit": {"rate_rad_s": 0.1},
+    "goal_delay": {"delay_s": 0.02},
+}
+
+
+@pytest.mark.parametrize("effect", FOLLOWED)
+@pytest.mark.parametrize("three_phase", [False, True], ids=["monitor model", "reference model"])
+def test_a_drive_that_is_caught_in_mid_run_has_followed_its_command_before(effect, three_phase):
+    """What it makes of its goal goes on, and the integral is what makes this drive ask for the current that flows."""
+    actuator = THESIS.with_values(PI) if three_phase else with_current_drive(THESIS).with_values(PI)
+    actuator = replace(actuator, effects={effect: FOLLOWED[effect]})
+    moves = Run(command("sine", {"amplitude_rad": 0.01, "frequency_Hz": 3.0}), 0.3)
+    model = simulate_reference if three_phase else simulate_monitor
+    seen = model(moves, actuator, effects=actuator.effects)
+    plant = ClosedLoop([seen], actuator, stretches=[[slice(1500, 2300)]])
+    [window] = plant.windows
+
+    def apart():
+        shown = plant.twin(0) if three_phase else {name: one[0] for name, one in plant.signals(0).items()}
+        return [np.sqrt(np.mean((shown[s] - window.measured[s]) ** 2)) for s in ("motor_position_rad", "current_A")]
+
+    followed = np.array(apart())
+    plant.windows[0] = replace(window, before=window.before[:0])
+    assert np.all(followed < 0.03 * np.array(apart()))
+
+
 def test_a_start_in_mid_run_is_bumpless_for_every_lane(monkeypatch):
     """The first current that each wants is about the one measured, whatever its gains are."""
     actuator = DRIVE.with_values(PI)

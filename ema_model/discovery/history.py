@@ -263,7 +263,7 @@ class Story:
         since it left twice as much or more, the floor is measured anew beside this one.
         """
         last = self.steps[-1]
-        if len(self.steps) == 1 or last.fit.calibration.is_final:
+        if len(self.steps) == 1:
             return
         fits = [step.fit for step in self.steps[-2:]]
         before, after = (floor_ratio(self.data, one.plant, one.calibration.signals) for one in fits)
@@ -271,7 +271,10 @@ class Story:
         data, held = self.data, self.held
         if moves_otherwise:
             data, held = data.beside(last.fit), None if held is None else held.beside(last.fit)
-        again = last.rung.change.kind == "fault" or before > FAR
+        is_final = last.fit.calibration.is_final
+        if is_final and data.weighs_as(self.data):
+            return
+        again = not is_final and (last.rung.change.kind == "fault" or before > FAR)
         found = fitted_to_the_end(data, last.fit, again, tell)  # tell may raise to stop
         self.steps.pop()
         if moves_otherwise:

@@ -109,7 +109,7 @@ def silent(windows: Sequence[Window], floors: Sequence[Floor]) -> tuple[str, str
 # how far the Monitor Model is from its three-phase twin under the same command (MODEL §2). The twin differs most in
 # transients, so its floor is local: the rms within 12.5 ms on either side. Where the motor stands, friction holds it
 # at any place in a band, and the model's error there is one error, however long it stands. When a command jumped is
-# known to within a sample, which moves the transient that follows.
+# known to within a sample, which moves the transient that follows; how it went between samples is not known at all.
 #
 # A fit takes part of the twin's difference up in its parameters: `after_fit` tells what a true model then leaves.
 
@@ -205,13 +205,15 @@ def floor(
     window, given = model.windows[place], stated or {}
     told = {name: one["noise"] for name, one in given.items() if "noise" in one}
     twins, late = twin_error(model, place, None, k), model.a_sample_late(place, k)
+    between = model.between_samples(place, k)
     noise = model.noise(place, told)
     noise |= {name: _of_sensors(noise[name], twins[name]) for name in twins if name not in told}
     slow = {}
     for name in noise:
         lasting = local_rms(twins[name], window.block_s) if twins else np.zeros(window.blocks)
         jump = late[name] / np.sqrt(12.0) if late else 0.0  # anywhere within the sample
-        own = np.hypot(np.hypot(lasting, jump), window.lasting.get(name, 0.0))
+        drawn = local_rms(between[name], window.block_s) if between else 0.0
+        own = np.hypot(np.hypot(lasting, jump), np.hypot(drawn, window.lasting.get(name, 0.0)))
         slow[name] = np.hypot(own, given.get(name, {}).get("accuracy", 0.0))
     return Floor(
         noise,

@@ -191,6 +191,19 @@ class ClosedLoop:
         now, then = (self._simulated(one, k=k) for one in (window, later))
         return {name: then[name][0] - now[name][0] for name in now}
 
+    def between_samples(self, place: int, k: ArrayLike | None = None) -> Signals:
+        """As in `Model`."""
+        window = self.windows[place]
+        if window.steps_per_sample == 1 or window.input != "command_rad":
+            return {}
+        steps = window.steps_per_sample
+        told = np.concatenate([window.before, window.command])
+        straight = _straight(told, steps)
+        first = len(window.before)
+        other = replace(window, before=straight[:first], command=straight[first:])
+        smooth, chords = (self._simulated(one, k=k) for one in (window, other))
+        return {name: chords[name][0] - smooth[name][0] for name in smooth}
+
     def begun(
         self,
         window: LoopWindow,
@@ -270,6 +283,16 @@ class ClosedLoop:
 def _command(window: LoopWindow) -> Recorded:
     """What a window's model is told, at its steps."""
     return Recorded(np.arange(len(window.command)) * window.step_s, window.command)
+
+
+def _straight(command: Array, steps: int) -> Array:
+    """A command (n,) that goes straight from sample to sample, of so many steps each, but where it jumps."""
+    samples = np.arange(0, len(command), steps)
+    values = command[samples]
+    straight = np.interp(np.arange(len(command)), samples, values)
+    straight[samples[-1] :] = command[samples[-1] :]
+    jumped = np.append(jumps(values), False).repeat(steps)[: len(command)]
+    return np.where(jumped, command, straight)
 
 
 def _before(window: LoopWindow, run: Run) -> Array:

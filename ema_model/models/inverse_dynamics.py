@@ -118,6 +118,10 @@ class InverseDynamics:
         """Nothing: no command is simulated."""
         return {}
 
+    def between_samples(self, place: int, k: ArrayLike | None = None) -> Signals:
+        """Nothing: no command is simulated."""
+        return {}
+
     def _currents(self, rows: Array, n: int, window: Stretch, acceleration: Array) -> Array:
         """(n, samples), A"""
         currents = np.empty((n, window.position.size))

@@ -125,3 +125,7 @@ class Model(Protocol):
     def a_sample_late(self, place: int, k: ArrayLike | None = None) -> Signals:
         """What changes if the command comes a sample later, (blocks,) each; empty where it has no jump."""
         ...
+
+    def between_samples(self, place: int, k: ArrayLike | None = None) -> Signals:
+        """What changes if the command goes straight from sample to sample, (blocks,) each; empty without samples."""
+        ...

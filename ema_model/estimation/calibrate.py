@@ -324,14 +324,15 @@ class Calibration:
     free: tuple[str, ...]
     is_final: bool = True  # it went to its end, and its intervals are the recordings'
 
-    def start_of(self, window: int | None) -> tuple[float, float, float]:
+    def start_of(self, window: int | None) -> tuple[float, float, float, float]:
         """How a fitted window began beyond what was measured; 0 if unknown.
 
-        The motor's angle and its place in the play, rad at the motor, and its speed, rad/s.
+        The motor's angle and its place in the play, rad at the motor, its speed, rad/s, and the torque that its drive
+        asked for, N·m.
         """
-        found = (self.starts.get(f"{kind} {window}") for kind in ("turned", "play", "faster"))
-        turned, play, faster = (0.0 if one is None else one.value for one in found)
-        return turned, play, faster
+        found = (self.starts.get(f"{kind} {window}") for kind in ("turned", "play", "faster", "pull"))
+        turned, play, faster, pull = (0.0 if one is None else one.value for one in found)
+        return turned, play, faster, pull
 
     @property
     def as_result(self) -> Calibration:

@@ -52,7 +52,7 @@ class Unknown:
     sigma: float
     low: float = -BOUND
     high: float = BOUND
-    kind: Literal["parameter", "fault", "turned", "play", "faster", "load", "lag"] = "parameter"
+    kind: Literal["parameter", "fault", "turned", "play", "faster", "pull", "load", "lag"] = "parameter"
     place: int = 0  # of a fault: which; of a start: its window; of a load and of a lag: its recording
     step: float = _STEP  # of the difference that a derivative is taken by
 
@@ -148,7 +148,8 @@ def starts_of(model: Model, floors: Sequence[Floor], *, worn: bool, exact: bool 
     """Where the motor and the play were at each window's first sample, beyond what it says.
 
     Of a motor that a voltage is put in, its speed as well: such recordings begin anywhere in a motion, and no loop
-    brings it back.
+    brings it back.  Of a speed loop with an integral action, what it asked for: a few samples of the current tell it,
+    and what they are off by is in the position until the integral has made up for it.
 
     worn: the play may be far wider than the file says.  exact: the recordings are a simulation's, whose sensors are
     known but for their noise.
@@ -158,6 +159,8 @@ def starts_of(model: Model, floors: Sequence[Floor], *, worn: bool, exact: bool 
     transmission = model.actuator.transmission
     tau = transmission.gear_ratio
     half_play = 0.5 * transmission.backlash_rad / tau
+    controller = model.actuator.controller
+    has_integral = controller.kind == "cascade" and np.any(np.asarray(controller.integral_gain_Nm_rad) != 0.0)
     widest = half_play * (_WIDEST_PLAY if worn else 1.0)
     found = []
     for i, (window, floor) in enumerate(zip(model.windows, floors)):
@@ -166,6 +169,9 @@ def starts_of(model: Model, floors: Sequence[Floor], *, worn: bool, exact: bool 
             found.append(Unknown(f"faster {i}", 0.0, _speed_at_start(window, floor), kind="faster", place=i))
             if not any(name in window.measured for name in POSITIONS):
                 continue
+        if has_integral and "current_A" in floor.noise:
+            pull = model.actuator.controller.torque_constant_Nm_A * floor.noise["current_A"] * samples
+            found.append(Unknown(f"pull {i}", 0.0, pull, kind="pull", place=i))
         motor = floor.noise.get("motor_position_rad", half_play) * samples
         user = floor.noise.get("user_position_rad", tau * widest) * samples / tau
         turned = math.hypot(motor, 0.0 if exact else _TURNED_RAD)
@@ -238,6 +244,7 @@ class Rig(NamedTuple):
     turned_rad: Any  # numbers, or (n,)
     play_rad: Any
     faster_rad_s: Any
+    pull_Nm: Any
     effects: Effects
 
 
@@ -400,7 +407,8 @@ class Problem:
     def _places(self, window: int) -> dict[str, int]:
         """Of the kinds that are not all windows' alike: where a window's own stands."""
         recording = self.model.windows[window].recording
-        return {"turned": window, "play": window, "faster": window, "load": recording, "lag": recording}
+        own = dict.fromkeys(("turned", "play", "faster", "pull"), window)
+        return {**own, "load": recording, "lag": recording}
 
     def parts(self) -> list[tuple[int, str, slice]]:
         """Where the residuals of each window's signals stand: window, signal, rows."""
@@ -472,8 +480,8 @@ class Problem:
         if "load" in own:
             effects = {**effects, LOAD: {"torque_Nm": own["load"]}}
         actuator = self.model.actuator.varied(self.parameters(x))
-        turned, play, faster = (own.get(kind, 0.0) for kind in ("turned", "play", "faster"))
-        return Rig(actuator, self.k(x), turned, play, faster, effects)
+        start = (own.get(kind, 0.0) for kind in ("turned", "play", "faster", "pull"))
+        return Rig(actuator, self.k(x), *start, effects)
 
 
 def _room(n: int, count: int, others: int) -> int:

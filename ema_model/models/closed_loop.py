@@ -90,6 +90,7 @@ class ClosedLoop:
         turned_rad: ArrayLike = 0.0,
         play_rad: ArrayLike = 0.0,
         faster_rad_s: ArrayLike = 0.0,
+        pull_Nm: ArrayLike = 0.0,
         effects: Effects | None = None,
         *,
         even: bool = False,
@@ -99,7 +100,7 @@ class ClosedLoop:
         if even:
             mean = np.full_like(window.load, window.load.mean())
             window = replace(window, load=mean, supply=np.ones_like(window.supply))
-        return self._simulated(window, actuator, k, turned_rad, play_rad, faster_rad_s, effects)
+        return self._simulated(window, actuator, k, turned_rad, play_rad, faster_rad_s, pull_Nm, effects)
 
     def twin(
         self,
@@ -143,6 +144,7 @@ class ClosedLoop:
         turned_rad: ArrayLike,
         play_rad: ArrayLike,
         faster_rad_s: ArrayLike,
+        pull_Nm: ArrayLike,
         effects: Effects,
     ) -> Signals:
         """As in `Model`."""
@@ -164,7 +166,7 @@ class ClosedLoop:
             start_rad=window.user_rad + np.asarray(turned_rad) * actuator.transmission.gear_ratio,
             start_speed_rad_s=window.speed_rad_s + np.asarray(faster_rad_s),
             start_play_rad=window.play_rad + np.asarray(play_rad),
-            start_integral_Nm=window.integral_Nm(actuator, k, turned_rad, play_rad),
+            start_integral_Nm=window.integral_Nm(actuator, k, turned_rad, play_rad, pull_Nm),
             start_time_s=window.begins_s,
             before=_before(window, Run(_command(window), samples / rate_Hz, rate_Hz)),
         )
@@ -212,6 +214,7 @@ class ClosedLoop:
         turned_rad: ArrayLike = 0.0,
         play_rad: ArrayLike = 0.0,
         faster_rad_s: ArrayLike = 0.0,
+        pull_Nm: ArrayLike = 0.0,
         effects: Effects | None = None,
     ) -> tuple[Actuator, Array, Array]:
         """A window as kernels take it: the actuator as it was in it, its parameters and state, (blocks, rows·LANES).
@@ -234,7 +237,7 @@ class ClosedLoop:
             window.speed_rad_s + np.asarray(faster_rad_s),
             window.play_rad + np.asarray(play_rad),
             self.stack,
-            window.integral_Nm(actuator, k, turned_rad, play_rad),
+            window.integral_Nm(actuator, k, turned_rad, play_rad, pull_Nm),
             window.begins_s,
         )
         return actuator, rows, state

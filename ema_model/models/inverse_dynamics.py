@@ -66,6 +66,7 @@ class InverseDynamics:
         turned_rad: ArrayLike = 0.0,
         play_rad: ArrayLike = 0.0,
         faster_rad_s: ArrayLike = 0.0,
+        pull_Nm: ArrayLike = 0.0,
         effects: Effects | None = None,
         *,
         even: bool = False,

@@ -49,16 +49,20 @@ class LoopWindow(Window):
     begins_s: float  # since the recording's start
 
     def integral_Nm(
-        self, actuator: Actuator, k: ArrayLike, turned_rad: ArrayLike = 0.0, play_rad: ArrayLike = 0.0
+        self,
+        actuator: Actuator,
+        k: ArrayLike,
+        turned_rad: ArrayLike = 0.0,
+        play_rad: ArrayLike = 0.0,
+        pull_Nm: ArrayLike = 0.0,
     ) -> Array:
         """The integral action of the speed loop at the start, for k (n, 8) or (8,): `integral_at_start`.
 
-        turned_rad, play_rad: the start beyond what was measured of it, rad at the motor.
+        turned_rad, play_rad, pull_Nm: the start beyond what was measured of it, rad and torque at the motor.
         """
         away = (np.asarray(turned_rad) + self.play_rad + np.asarray(play_rad)) * actuator.transmission.gear_ratio
-        return integral_at_start(
-            actuator, k, float(self.command[0]), self.user_rad + away, self.speed_rad_s, self.current_A
-        )
+        start = float(self.command[0]), self.user_rad + away, self.speed_rad_s, self.current_A
+        return integral_at_start(actuator, k, *start) + np.asarray(pull_Nm)
 
     def at_longer_steps(self, most_s: float) -> LoopWindow:
         """The same at the longest steps up to most_s, s, of which a sample holds a whole number."""

@@ -38,15 +38,17 @@ def later(values: Array, late_s: Array, period_s: float, *, smooth: bool = False
 
 _DELAY = "computation_delay"
 _SENSORS_DELAY = "sensors.delay_s"
+_WITHIN_SAMPLE = 12.0**-0.5  # of it: anywhere within a sample
 _SERVO_SAMPLE_S = 2e-3  # of a usual position servo
 
 
 def with_delay_of_drive(actuator: Actuator, measurements: Sequence[Measurement]) -> Actuator:
-    """The actuator with a computation delay of 0 that a calibration may move.
+    """The actuator with a computation delay of 0 that a calibration may move, and the delay of its sensors as well.
 
-    1 σ is about a sample of the recordings, of a position servo no less than its own, however fast it is logged.
+    1 σ is about a sample of the recordings, of a position servo no less than its own, however fast it is logged; of the
+    sensors' a third: a command and what was measured beside it are of the same sample, but not of the same moment.
 
-    Without it, what the loop loses of its damping is taken for a torque constant or a current sensor that is off.
+    Without them, what the loop loses of its damping is taken for a torque constant or a current sensor that is off.
     As it is where its drive is the three-phase model's, which is not a digital one, or where no drive is simulated.
     """
     if actuator.controller.kind == "open" and not actuator.takes_voltage:
@@ -57,11 +59,15 @@ def with_delay_of_drive(actuator: Actuator, measurements: Sequence[Measurement])
     if _DELAY in actuator.effects or not any(one.free for one in actuator.tolerances.values()):
         return actuator
     own = _SERVO_SAMPLE_S if actuator.controller.kind == "position" else 0.0
-    late = Tolerance(max(own, *(one.sample_period_s for one in measurements)), True)
+    sample = max(one.sample_period_s for one in measurements)
+    looked_for = {
+        _SENSORS_DELAY: Tolerance(_WITHIN_SAMPLE * sample, True),
+        f"effects.{_DELAY}.delay_s": Tolerance(max(own, sample), True),
+    }
     return replace(
         actuator,
         effects={**actuator.effects, _DELAY: {"delay_s": 0.0}},
-        tolerances={**actuator.tolerances, f"effects.{_DELAY}.delay_s": late},
+        tolerances={**looked_for, **actuator.tolerances},
     )
 
 

@@ -80,6 +80,7 @@ class Model(Protocol):
         turned_rad: ArrayLike = 0.0,
         play_rad: ArrayLike = 0.0,
         faster_rad_s: ArrayLike = 0.0,
+        pull_Nm: ArrayLike = 0.0,
         effects: Effects | None = None,
         *,
         even: bool = False,
@@ -87,8 +88,8 @@ class Model(Protocol):
         """What a window's sensors would show, all that is measured there and more: k (n, 8) → (n, blocks) each.
 
         actuator, k, effects: in place of the model's own.  Parameters of the actuator and of effects, turned_rad (the
-        motor's angle at the start, rad, beyond the measured one), play_rad (the same for its place in the play) and
-        faster_rad_s (for its speed) may be arrays (n,).
+        motor's angle at the start, rad, beyond the measured one), play_rad (the same for its place in the play),
+        faster_rad_s (for its speed) and pull_Nm (for the torque that the drive asks for) may be arrays (n,).
         even: under the window's mean load and a supply that does not change.
         """
         ...
@@ -113,6 +114,7 @@ class Model(Protocol):
         turned_rad: ArrayLike,
         play_rad: ArrayLike,
         faster_rad_s: ArrayLike,
+        pull_Nm: ArrayLike,
         effects: Effects,
     ) -> Signals:
         """Those of a few at once, k (n, 8), all else as of `signals`: (n, blocks) each."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 from functools import lru_cache
 
@@ -25,6 +26,8 @@ Array = NDArray[np.float64]
 _BESIDE = 20  # samples behind a time, that tell how a command goes there
 _FOLLOWED_S = 0.5  # before a start in mid-run: what a drive's goal still remembers
 COMPARED = ("current_A", "motor_speed_rad_s", "motor_position_rad", "user_position_rad")
+_SURELY = 4.0  # standard errors of a slope, from which on it moves
+_STEADY = 0.75  # of the speed in the second half of a time, that it is in the first: from rest it is a third
 _SLOPE_SAMPLES = 10  # on either side of a start in mid-run, over which the speed is found
 _COARSE_S = 0.01  # the same of the user's encoder, which is coarse beside a motor's
 CONTEXT = ("load_torque_Nm", "temperature_C")
@@ -248,10 +251,28 @@ def _start(measurement: Measurement, actuator: Actuator, at: int) -> tuple[float
 def _slope(measurement: Measurement, position: Array, at: int, least_s: float = 0.0) -> float:
     """The speed of a position about a sample; a rig's own is often the encoder's difference, far too coarse for one.
 
-    0 where a recording begins.  least_s: on either side, over which it is found at least.
+    least_s: on either side, over which it is found at least.  Where a recording begins, it is 0 unless it begins in
+    mid motion: from rest, the second half of a time is run through at three times the first one's speed.
     """
-    near = _near(at, max(_SLOPE_SAMPLES, round(least_s / measurement.sample_period_s)))
-    return 0.0 if at == 0 else float(np.polyfit(measurement.time_s[near], position[near], 1)[0])
+    samples = max(_SLOPE_SAMPLES, round(least_s / measurement.sample_period_s))
+    time = measurement.time_s
+    if at > 0:
+        near = _near(at, samples)
+        return _line(time[near], position[near])[0]
+    halves = slice(samples), slice(samples, 2 * samples)
+    (early, error), (late, _) = (_line(time[half], position[half]) for half in halves)
+    is_moving = late != 0.0 and abs(early) > _SURELY * error and _STEADY < early / late < 1.0 / _STEADY
+    return 1.5 * early - 0.5 * late if is_moving else 0.0
+
+
+def _line(time_s: Array, position: Array) -> tuple[float, float]:
+    """The slope of a position, and its standard error."""
+    if len(time_s) < 3:
+        return 0.0, math.inf
+    place = time_s - time_s.mean()
+    slope = float(place @ position / (place @ place))
+    left = position - position.mean() - slope * place
+    return slope, math.sqrt(float(left @ left) / (len(place) - 2) / float(place @ place))
 
 
 def _current(measurement: Measurement, actuator: Actuator, at: int, speed: float) -> float:

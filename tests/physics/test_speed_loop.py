@@ -208,6 +208,25 @@ def test_a_start_in_mid_run_is_bumpless_for_every_lane(monkeypatch):
     np.testing.assert_array_equal(plant.signals(0, proportional, k)["current_A"][:, 0], shown)
 
 
+def test_what_the_drive_asked_for_at_a_start_is_fitted():
+    """A noisy current tells it to a few percent, and what that is off by would stand in the position for long."""
+    actuator = DRIVE.with_values(PI)
+    noisy = {"current_A": 0.5, "motor_position_rad": 1e-4, "user_position_rad": 1e-7}
+    random = np.random.default_rng(5)
+    later = command("step", {"final_rad": 1e-3, "time_s": 0.25})
+    held = simulate_monitor(Run(later, 0.4, load_torque_Nm=LOAD), actuator).signals
+    whole = {name: values[2000:] for name, values in held.items()}  # it stands, and its integral holds the load
+    seen = {name: values + noisy.get(name, 0.0) * random.standard_normal(len(values)) for name, values in whole.items()}
+    del seen["motor_speed_rad_s"]
+    plant = ClosedLoop([Measurement(seen)], actuator)
+    found = calibrate(plant, [floor(plant, 0)], free=())
+    asked = DRIVE.controller.torque_constant_Nm_A * (whole["current_A"][0] - plant.windows[0].current_A)
+    assert found.chi2_per_value < 1.1 and found.starts["pull 0"].value == pytest.approx(asked, abs=5e-3)
+    measured = plant.windows[0].measured["motor_position_rad"]
+    fitted, taken = (np.std(one["motor_position_rad"] - measured) for one in (found.signals[0], plant.signals(0)))
+    assert fitted < 0.3 * taken
+
+
 def test_without_a_measured_current_a_stretch_begins_in_balance():
     actuator = with_current_drive(THESIS).with_values(PI)
     whole = recorded(actuator).signals
@@ -228,3 +247,13 @@ def test_calibration_recovers_the_integral_gain_of_a_reference_model(truth):
     found = calibrate(plant, [floor(plant, 0)]).parameters[path]
     assert found.value == pytest.approx(truth, rel=0.05)
     assert found.interval90[0] - 0.1 < truth < found.interval90[1] + 0.1
+
+
+@pytest.mark.parametrize("first", [0, 1500], ids=["at rest", "in mid motion"])
+def test_a_recording_may_begin_in_mid_motion(first):
+    """Its first samples say how fast it moves; one that begins at rest begins at 0, however fast it is soon."""
+    whole = simulate_monitor(Run(command("chirp"), 0.3), DRIVE).signals
+    seen = {name: values[first:] for name, values in whole.items() if name != "motor_speed_rad_s"}
+    [window] = ClosedLoop([Measurement(seen)], DRIVE).windows
+    assert window.speed_rad_s == pytest.approx(whole["motor_speed_rad_s"][first], rel=0.05, abs=1e-9)
+    assert (first == 0) == (window.speed_rad_s == 0.0)

@@ -79,6 +79,14 @@ class Actuator:
         return self.controller.kind == "cascade" and self.inverter.kind == "hysteresis"
 
     @property
+    def has_one_clock(self) -> bool:
+        """Whether what is put in and what is measured stand at the moments that a log says, but for sensors' delays.
+
+        A digital drive's bus carries a command before or after the sample that it is logged in.
+        """
+        return self.has_reference_model or self.controller.kind == "open"
+
+    @property
     def k(self) -> NDArray[np.float64]:
         """The known faults with the healthy ones, (8,)."""
         return vector(self.faults)

@@ -275,13 +275,14 @@ def default_of(path: str) -> float | None:
     return getattr(SECTIONS[section], name, None)  # a dataclass keeps its defaults on the class
 
 
-def low_limit(path: str, controller: str = "") -> float:
+def low_limit(path: str, one_clock: bool = True) -> float:
     """The least value that a parameter may take; 0 where it must only be above.
 
-    controller: its kind; without a known one, the sensors' delay is that of one signal behind another, of any sign.
+    one_clock: what is put in and what the sensors show stand at the moments that the log says, so that these can only
+    be late.  Else the sensors' delay is that of one signal behind another, of any sign.
     """
     name = path.split(".")[-1]
-    any_sign = name in _ANY_SIGN or (controller == "unknown" and path == _BEHIND)
+    any_sign = name in _ANY_SIGN or (path == _BEHIND and not one_clock)
     return -math.inf if path.startswith("effects.") or any_sign else 0.0
 
 

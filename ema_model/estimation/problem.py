@@ -135,7 +135,7 @@ def physical_limits(name: str, actuator: Actuator) -> tuple[float, float]:
     if name.startswith("effects."):
         _, effect, parameter = name.split(".")
         return next((p.low, p.high) for p in find(effect, actuator.axes).parameters if p.name == parameter)
-    return (low_limit(name, actuator.controller.kind), math.inf) if "." in name else (-math.inf, math.inf)
+    return (low_limit(name, actuator.has_one_clock), math.inf) if "." in name else (-math.inf, math.inf)
 
 
 def _room_to_limit(limit: float, nominal: float) -> float:

@@ -266,7 +266,7 @@ def _alone(pool: Pool, actuator: Actuator, paths: Sequence[str]) -> dict[str, Al
 
 def _low(path: str, actuator: Actuator) -> float:
     """What a parameter cannot be below."""
-    return -np.inf if path.startswith("effects.") else low_limit(path, actuator.controller.kind)
+    return -np.inf if path.startswith("effects.") else low_limit(path, actuator.has_one_clock)
 
 
 def _type_actuator(actuator: Actuator, of_type: Mapping[str, OfType]) -> Actuator:

@@ -8,12 +8,11 @@ MuJoCo is of an environment of its own, and no code is shared with the product: 
 and frictionloss; a `motor`, a `position` servo or a `dcmotor` drives it; an arm hangs in gravity; joints and tendons
 have their springs; a second mass hangs on a tendon that gives or has play; actuators have delays and filters.  What
 MuJoCo has no element for (ripple, asymmetric friction, a bump) is applied as a generalized force, or as a frictionloss
-that is set anew each step.  The drive's loop is sampled at
-20 kHz, a hobby servo's at 10 kHz.
+that is set anew each step.  The drive's loop is sampled at 20 kHz, a hobby servo's at 10 kHz.
 
 A folder a plant: `base.toml` (what its owner knows: the plant without what is hidden, with tolerances, from which the
 true values are drawn), two recordings to fit and one held out, of other commands, with encoders' counts and sensors'
-noise, and `truth.json`.  Each plant follows from its seed alone.
+noise, and `truth.json`.  Each plant follows from its seed alone; those that are there are left as they are.
 
 Whether what is hidden is showable is said here, before any discovery: the plant is simulated once more without the
 effect under the same commands.  Of the change of each logged signal a constant is taken away (not of a constant load),
@@ -737,13 +736,14 @@ def _joint(kind: str, owner: Owner, hidden: tuple[str, ...]) -> Rig:
     natural, relative = owner.near(22.0), owner.near(0.9, 0.2)
     kp, kv = inertia * natural**2, 2.0 * relative * natural * inertia
     owner.says("controller", 'kind = "cascade"')
-    # The servo asks for a torque, and its current is what the true motor needs for it.
     ratio = owner.knows("controller.position_gain_1_s", kp / kv, 0.01)
     kv = owner.knows("controller.speed_gain_Nms_rad", kv, 0.01)
-    drive = Drive(constant=motor["torque_constant"], current_limit=500.0, speed_limit=1000.0)
     owner.says("controller", "integral_gain_Nm_rad = 0.0")
-    owner.truth["controller.torque_constant_Nm_A"] = motor["torque_constant"]
-    _says_loop(owner, replace(drive, constant=owner.told["motor.torque_constant_Nm_A"]))
+    told = owner.told["motor.torque_constant_Nm_A"]
+    drive = Drive(constant=told, current_limit=500.0)
+    _says_loop(owner, drive)
+    # Of the torque that the servo's firmware asks for it makes a current by what it takes the motor to be.
+    kv *= motor["torque_constant"] / told
     plant = Plant(kind, **motor, effects={"servo": {"kp": ratio * kv, "kv": kv}})
     moves = _moves(owner, owner.near(0.9), owner.near(1.6), 3.0)
     return Rig(plant, drive, moves, _rate(owner), 3.0, (), owner)
@@ -912,7 +912,8 @@ def main(arguments: list[str]) -> None:
     groups = ['title = "Plants of MuJoCo"', 'about = "Plants of a kind that nobody tuned to, an owner\'s file each."']
     for seed in range(int(first), int(last or first) + 1):
         name = f"plant_{seed:03d}"
-        truth = written(seed, folder / name)
+        saved = folder / name / "truth.json"  # written last
+        truth = json.loads(saved.read_text(encoding="utf-8")) if saved.exists() else written(seed, folder / name)
         shows = ", ".join(f"{n} {max(one['change_over_noise'].values()):.3g}" for n, one in truth["hidden"].items())
         print(f"{name} {truth['kind']:13}{shows or '-'}", flush=True)
         recordings = f'{{ each = "{name}", fit = ["fit_1.csv", "fit_2.csv"], holdout = ["held.csv"] }}'

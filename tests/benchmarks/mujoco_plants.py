@@ -905,17 +905,24 @@ def written(seed: int, folder: Path, kind: str = "", hidden: tuple[str, ...] | N
     return truth
 
 
+def turn(seed: int) -> int:
+    """Where a seed stands in the order of work: mixed, so that an interrupted study is a sample of the whole."""
+    return seed * 37 % 100
+
+
 def main(arguments: list[str]) -> None:
     """As the module says."""
     folder = Path(arguments[0])
     first, _, last = (arguments[1] if len(arguments) > 1 else f"{STUDY[0]}-{STUDY[-1]}").partition("-")
+    seeds = range(int(first), int(last or first) + 1)
     groups = ['title = "Plants of MuJoCo"', 'about = "Plants of a kind that nobody tuned to, an owner\'s file each."']
-    for seed in range(int(first), int(last or first) + 1):
+    for seed in sorted(seeds, key=turn):
         name = f"plant_{seed:03d}"
         saved = folder / name / "truth.json"  # written last
         truth = json.loads(saved.read_text(encoding="utf-8")) if saved.exists() else written(seed, folder / name)
         shows = ", ".join(f"{n} {max(one['change_over_noise'].values()):.3g}" for n, one in truth["hidden"].items())
         print(f"{name} {truth['kind']:13}{shows or '-'}", flush=True)
+    for name in (f"plant_{seed:03d}" for seed in seeds):
         recordings = f'{{ each = "{name}", fit = ["fit_1.csv", "fit_2.csv"], holdout = ["held.csv"] }}'
         groups.append(f'\n[groups.{name}]\ndoes = "discover"\nactuator = "{name}/base.toml"\nrecordings = {recordings}')
     (folder / "mujoco_plants.toml").write_text("\n".join(groups) + "\n", encoding="utf-8")

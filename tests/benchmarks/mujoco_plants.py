@@ -182,7 +182,11 @@ class Drive:
 
 
 def simulated(plant: Plant, drive: Drive, command: Moves, rate_Hz: float, duration_s: float) -> dict[str, Array]:
-    """What would be seen without noise, at the rate of the log: goal, angles, motor's speed, current."""
+    """What would be seen without noise, at the rate of the log: goal, angles, motor's speed, current.
+
+    Currents are means over the sample before, as of a logger that filters by its own rate; a drive that nobody
+    describes logs its own value of the moment.
+    """
     model = mujoco.MjModel.from_xml_string(plant.mjcf())
     data = mujoco.MjData(model)
     sub = round(1.0 / (rate_Hz * STEP_S))
@@ -207,8 +211,8 @@ def simulated(plant: Plant, drive: Drive, command: Moves, rate_Hz: float, durati
     seen_at = 1 if plant.is_split else 0
     integral, current = 0.0, 0.0
     kept = np.empty((count, 4))
-    delayed = "computation_delay" in plant.effects
-    lagged = "current_loop_lag" in plant.effects
+    by_force = plant.kind == "joint" or "computation_delay" in plant.effects or "current_loop_lag" in plant.effects
+    total = 0.0
     for i, wanted in enumerate(goal.tolist()):
         q = position[0]
         seen = position[seen_at]
@@ -246,14 +250,12 @@ def simulated(plant: Plant, drive: Drive, command: Moves, rate_Hz: float, durati
         moment = i - before
         if moment >= 0 and moment % sub == 0:
             row = kept[moment // sub]
-            row[0], row[1], row[2] = theta, omega, seen
+            row[:] = theta, omega, seen, flows if plant.kind == "unknown" else total / sub
+        if moment % sub == 0:
+            total = 0.0
         step(model, data)
-        if moment >= 0 and moment % sub == 0:
-            # What the actuator gave in this step; of a motor whose iron saturates, the current that was sent.
-            force = data.actuator_force[0]
-            row[3] = flows
-            if delayed or lagged or plant.kind == "joint":
-                row[3] = force / kt
+        # What the actuator gave in this step; of a motor whose iron saturates, the current that was sent.
+        total += data.actuator_force[0] / kt if by_force else flows
     time = np.arange(count) / rate_Hz
     if not np.all(np.isfinite(kept)):
         raise FloatingPointError("a plant has left all bounds")
@@ -368,7 +370,8 @@ def chirp(random: np.random.Generator, size: float, end_Hz: float, duration_s: f
     def moves(time: Array) -> Array:
         rate = 0.3 + (end_Hz - 0.3) * time / duration_s
         turned = 2.0 * np.pi * (0.3 * time + 0.5 * (end_Hz - 0.3) / duration_s * time**2)
-        return sign * size * np.minimum(time / 0.4, 1.0) ** 2 * np.minimum(1.0, 1.2 / rate) * np.sin(turned)
+        begins = np.sin(0.5 * np.pi * np.minimum(time / 0.4, 1.0)) ** 2
+        return sign * size * begins / np.sqrt(1.0 + (rate / 1.2) ** 2) * np.sin(turned)
 
     return moves
 

@@ -18,6 +18,8 @@ from ema_model.discovery import Discovery
 from ema_model.discovery.criteria import LARGEST_GROUP
 
 COLUMNS = ("showable", "right", "exact", "part", "wrong", "silent", "unknown with its variable", "hardly showable")
+# What the two positions show by themselves, by what it goes with.
+_BEYOND_THE_MOTOR = {"acceleration": "torsional_compliance", "direction": "backlash"}
 _AS_PARAMETER = ("dry_friction", "inertia_error", "backlash")  # which the file has a parameter for
 
 
@@ -91,7 +93,7 @@ def tally(row: Mapping[str, Any], truth: Mapping[str, Any]) -> Counter[str]:
         return (
             any(covers(*one, name) for one in groups)
             or any(part in path for part in held[name]["outside"] for path in row["outside"])
-            or (row["shaft"] == name)
+            or _BEYOND_THE_MOTOR.get(row["shaft"], row["shaft"]) == name
         )
 
     wrong = [claim["name"] for claim, group in groups if not any(covers(claim, group, name) for name in held)]

@@ -196,7 +196,7 @@ class ClosedLoop:
     def between_samples(self, place: int, k: ArrayLike | None = None) -> Signals:
         """As in `Model`."""
         window = self.windows[place]
-        if window.steps_per_sample == 1 or window.input != "command_rad":
+        if window.steps_per_sample == 1 or self.actuator.has_one_clock:
             return {}
         steps = window.steps_per_sample
         told = np.concatenate([window.before, window.command])

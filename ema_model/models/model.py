@@ -129,5 +129,5 @@ class Model(Protocol):
         ...
 
     def between_samples(self, place: int, k: ArrayLike | None = None) -> Signals:
-        """What changes if the command goes straight from sample to sample, (blocks,) each; empty without samples."""
+        """What changes if the command goes straight between samples, (blocks,) each; empty where it is known to."""
         ...

@@ -33,7 +33,7 @@ def test_the_speed_is_that_of_the_position(rate, has_motor):
     first = time.size // 5
     plant = ClosedLoop([Measurement(signals)], SERVO, stretches=[[slice(0, first), slice(first, time.size)]])
     begins, later = (window.speed_rad_s * tau for window in plant.windows)
-    assert begins == 0.0, "a recording begins at rest"
+    assert begins == pytest.approx(speed[0], rel=0.05), "a recording may begin in mid motion"
     assert later == pytest.approx(speed[first], abs=0.05)
 
 

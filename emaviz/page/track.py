@@ -26,6 +26,7 @@ from emaviz.page.panel import (
     RECORD,
     REPORT,
     Cleared,
+    Example,
     FolderChoice,
     JobLine,
     KeepButtons,
@@ -154,6 +155,9 @@ _ASPECTS = (0.66, 0.42, 0.48)  # of the figures, height over width: the first st
 _SO_FAR_ASPECT = 0.45  # of the figure of flights that are too few to follow
 
 
+_EXAMPLE = "Run an example", "A life of sixty flights, with its threshold: made in the data folder, then tracked."
+
+
 class TrackResult:
     """Drawn on the slow screen's thread while "today" is dragged, else on the screen's."""
 
@@ -170,7 +174,11 @@ class TrackResult:
         self._history: History | None = None
         gui = page.server.gui
         self._by_hand = False  # whether somebody has chosen the k that is shown
-        self._told = add_html(gui, begin("No flights are tracked yet", _STEPS))
+        self.run_example: Callable[[], object] = lambda: None
+        self._empty = begin(
+            "No flights are tracked yet", _STEPS, Example(page, *_EXAMPLE, lambda: self.run_example()).html
+        )
+        self._told = add_html(gui, self._empty)
         self._so_far = gui.add_plotly(go.Figure(), config=_CONFIG, aspect=_SO_FAR_ASPECT, visible=False)
         self._life = gui.add_folder("The unit's life", visible=False)
         with self._life:
@@ -217,7 +225,7 @@ class TrackResult:
         if begun:
             self._seal.show()
         if history is None or last is None:
-            self._told.content = begin("No flights are tracked yet", _STEPS)
+            self._told.content = self._empty
             return
         at_end = begun or self._today.value >= self._today.max
         first, end = min(history.looks), max(history.looks)
@@ -337,6 +345,8 @@ class TrackPanel:
 
     def __init__(self, page: Page, following: Following, result: TrackResult, standing: Standing) -> None:
         self._page, self._following, self._result = page, following, result
+        self._example_asked = False
+        result.run_example = self._run_example
         gui, post = page.server.gui, page.screen.post
         add_html(gui, note(_ABOUT))
         hint = "Folders of the data folder that hold recordings"
@@ -380,6 +390,14 @@ class TrackPanel:
     def choose(self, name: str) -> None:
         """A folder by its name; on the screen's thread."""
         self._folder.choose(name)
+        if self._example_asked:
+            self._example_asked = False
+            self._begin()
+
+    def _run_example(self) -> None:
+        """The first challenge: its recordings are made, then tracked."""
+        practice = self._following.practice
+        self._example_asked = self._page.begins(lambda: practice.open(practice.shipped[0]), self._start)
 
     def show(self) -> None:
         """What is chosen, as a session's file says; its flights are shown once they are followed."""

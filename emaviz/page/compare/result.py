@@ -27,10 +27,10 @@ from emaviz.figures.theme import why_missing
 from emaviz.page.compare import WORKSPACE
 from emaviz.page.compare.columns import MappingStep
 from emaviz.page.measure import hint, marked
-from emaviz.page.panel import Cleared
+from emaviz.page.panel import Cleared, Example
 from emaviz.page.playback import PlaybackStrip
 from emaviz.page.style import IN_PAIRS
-from emaviz.page.window_layout import ALL_COLUMNS, COLUMNS, NEXT_COLUMN, PLOTS_EARLY, ROOM
+from emaviz.page.window_layout import ALL_COLUMNS, NEXT_COLUMN, PLOTS_EARLY, ROOM
 from emaviz.page.workspaces import Page
 from emaviz.scene.playback import Motion, motion
 from emaviz.server.viser_private import selector_of
@@ -297,12 +297,14 @@ _STEPS = (
 )
 
 
+_EXAMPLE = "Run an example", "Four recordings of a rig after its overhaul, one of them held out; some seconds."
+
+
 class ResultPanel:
     """Everything here is built and changed on the screen's thread.
 
     strip: its clock, for Compare's recording on the 3D actuator; step(preview): adds what a file's columns are, above
-    the preview; leads(): adds what may follow, below the plots, where it is seen however much is answered; keep(): adds
-    what saves a comparison, below it.
+    the preview; leads(): adds what may follow, below the answer; keep(): adds what saves a comparison, below the plots.
     """
 
     def __init__(
@@ -312,7 +314,9 @@ class ResultPanel:
         step: Callable[[Callable[[Opened, str], None]], MappingStep],
         leads: Callable[[], object],
         keep: Callable[[], Cleared],
+        example: Callable[[], object],
     ) -> None:
+        """example(): opens what is shipped to try it on."""
         self._page, self._strip = page, strip
         self._drawn_at = 0.0
         self._comparison: Comparison | None = None
@@ -322,8 +326,12 @@ class ResultPanel:
         self._mapped: list[Lines] = []  # what the preview draws
         self._buttons: list[Any] = []
         gui = page.server.gui
-        add_html(gui, COLUMNS)
-        self._headline = add_html(gui, begin("Nothing is compared yet", _STEPS))
+        self._empty = begin("Nothing is compared yet", _STEPS, Example(page, *_EXAMPLE, example).html)
+        self._headline = add_html(gui, self._empty)
+        self._next = gui.add_folder("Next", visible=False)
+        with self._next:  # below the answer, where it is seen however much is answered
+            add_html(gui, IN_PAIRS)
+            leads()
         add_html(gui, PLOTS_EARLY)
         self._numbers = add_html(gui, visible=False)
         self._place = gui.add_folder("The file's columns", visible=False)
@@ -345,10 +353,6 @@ class ResultPanel:
         with self._evidence:  # below the sentences that it shows, where that would stay empty
             add_html(gui, ROOM)
             self._plots.add_against()
-        self._next = gui.add_folder("Next", visible=False)
-        with self._next:
-            add_html(gui, IN_PAIRS)
-            leads()
         self._save = gui.add_folder("Keep it", visible=False)
         with self._save:
             self._kept = keep()
@@ -400,7 +404,7 @@ class ResultPanel:
         """Nothing is compared any more."""
         self._comparison = self._region = None
         self._place.visible = False
-        self._headline.content = begin("Nothing is compared yet", _STEPS)
+        self._headline.content = self._empty
         self._show_answer(False)
         self._strip.put(None, WORKSPACE.name)
 

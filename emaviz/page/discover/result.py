@@ -12,7 +12,7 @@ import plotly.graph_objects as go
 import viser
 
 from ema_model.commands import command
-from ema_model.discovery.result import Experiment
+from ema_model.discovery.result import Candidate, Experiment
 from ema_model.discovery.snapshot import Look
 from ema_model.discovery.words import (
     FLOOR_NOTE,
@@ -35,10 +35,10 @@ from ema_model.recordings import SIGNALS, Measurement
 from emaviz.figures import discovery
 from emaviz.figures.discovery import equation
 from emaviz.page.discover import WORKSPACE
-from emaviz.page.discover.candidate import CONFIG, EffectView
-from emaviz.page.panel import KeepButtons, Keeps
+from emaviz.page.discover.candidate import CONFIG, WAITS, Cards, EffectView
+from emaviz.page.panel import Example, KeepButtons, Keeps
 from emaviz.page.playback import PlaybackStrip
-from emaviz.page.window_layout import COLUMNS, NEXT_COLUMN
+from emaviz.page.window_layout import PLOTS_EARLY
 from emaviz.page.workspaces import Page
 from emaviz.scene.playback import motion
 from emaviz.session.discover import source
@@ -168,9 +168,13 @@ def run_of(track: Track, shown: str) -> Measurement:
 
 _STEPS = (
     "Choose measurements on the left: those of Compare, or one of the challenges.",
-    Html("Press <b>Start</b>: the model is calibrated, and its residual is compared with every effect of the library."),
+    Html(
+        "Press <b>Find what is missing</b> below a comparison, or <b>Start</b> here: every effect of the library and "
+        "every fault is held beside what the calibrated model leaves, and ranked."
+    ),
     "Add an effect: the error falls, also on what was held out. Then save the improved model, or use it in Explore.",
 )
+_EXAMPLE = "Run an example", "The first bench run of an actuator: three recordings, and one that is held out."
 HOME = Keeps(
     "Take it home",
     ".zip",
@@ -200,8 +204,11 @@ class DiscoveryPanel:
         self._look: Look | None = None
         self._titles: dict[str, str] = {}
         gui = page.server.gui
-        add_html(gui, COLUMNS)
-        self._headline = add_html(gui, begin("No discovery yet", _STEPS))
+        self._run_example: Callable[[], object] = lambda: None
+        example = Example(page, *_EXAMPLE, lambda: self._run_example())
+        self._empty = begin("No discovery yet", _STEPS, example.html)
+        self._headline = add_html(gui, self._empty)
+        add_html(gui, PLOTS_EARLY)
         self._keep_folder = gui.add_folder("Keep it", visible=False)
         with self._keep_folder:  # where it is seen without scrolling
             self._kept = keep()
@@ -217,35 +224,46 @@ class DiscoveryPanel:
         with self._model_folder:
             self._equation = add_html(gui)
             self._kept.add(HOME)
+        self._next = NextTest(page, discovering, load)
+        self._left_folder = gui.add_folder("Remaining residual", visible=False, expand_by_default=False)
+        with self._left_folder:
+            self._left: Any = gui.add_plotly(go.Figure(), config=CONFIG, aspect=0.5, visible=False)
+        self._cards = Cards(page, discovering)
         self._before_folder = gui.add_folder("Before and after", visible=False)
         with self._before_folder:
-            add_html(gui, NEXT_COLUMN)
             self._recording = gui.add_dropdown("Measurement", ["–"])
             self._signal = gui.add_dropdown("Signal", ["–"])
             self._actuator = ActuatorSwitch(page, discovering, self._track, strip)
             self._residual: Any = gui.add_plotly(go.Figure(), config=CONFIG, aspect=0.5, visible=False)
             self._explained: Any = gui.add_plotly(go.Figure(), config=CONFIG, aspect=0.6, visible=False)
-        self._left_folder = gui.add_folder("Remaining residual", visible=False, expand_by_default=False)
-        with self._left_folder:
-            self._left: Any = gui.add_plotly(go.Figure(), config=CONFIG, aspect=0.5, visible=False)
-        self._next = NextTest(page, discovering, load)
         self._recording.on_update(lambda event: event.client and page.screen.post("residual", self._draw_residual))
         self._signal.on_update(lambda event: event.client and page.screen.post("residual", self._draw_residual))
         self._reveal.on_click(lambda _: page.screen.post("reveal", self._revealed))
 
-    def connect(self, ask: Callable[[Callable[[], bool], Any], None], close: Callable[[], None]) -> None:
-        """ask(begin, button) starts a step; close() closes the opened card."""
-        self._effect.connect(ask, close)
+    def connect(
+        self, ask: Callable[..., None], open_card: Callable[[str | None], None], example: Callable[[], object]
+    ) -> None:
+        """ask(begin, button) starts a step; open_card(name) opens a candidate, or closes it, on the screen's thread.
+
+        example(): begins a discovery of something shipped.
+        """
+        self._run_example = example
+        self._effect.connect(ask, lambda: open_card(None))
+        self._cards.connect(ask, open_card)
         self._next.connect(ask)
 
     def busy(self, busy: bool) -> None:
         """Whether a step runs."""
+        if self._look is None:
+            self._headline.content = looking(self._discovering.job.title) if busy else self._empty
         self._effect.busy(busy)
+        self._cards.busy(busy)
         self._next.busy(busy)
 
     def open(self, name: str | None) -> None:
         """Opens a candidate, or closes it."""
         self._effect.open(self._look, name)
+        self._cards.open(name)
 
     def show(self, look: Look | None) -> None:
         """A story as it stands."""
@@ -258,11 +276,12 @@ class DiscoveryPanel:
         self._model_folder.visible = look is not None and bool(look.removable)
         self._left_folder.visible = look is not None and look.found.unknown is not None
         self._ladder.visible = look is not None
+        self._cards.show(look)
         self._next.show(look)
         if not self._discovering.source.revealed:
             self._truth.content = ""
         if look is None:
-            self._headline.content = begin("No discovery yet", _STEPS)
+            self._headline.content = looking(self._discovering.job.title) if self._discovering.running else self._empty
             self._actuator.refresh()
             return
         found = look.found
@@ -316,22 +335,34 @@ class DiscoveryPanel:
             self._discovering.events.revealed()
 
 
+def looking(title: str) -> Html:
+    """While there is nothing to show yet: what goes on, and what will be seen."""
+    about = (
+        "The model goes on from what it was calibrated to; then every effect and fault is held beside what it leaves."
+    )
+    return html('<div class="emaviz-cards">{}<div>{}</div>{}</div>', large(f"{title} …", "open"), about, WAITS)
+
+
+def next_step(look: Look, best: Candidate) -> str:
+    """'Next: cogging torque, 97 % probable, would bring the error from 3.47 to about 2.98 times the floor.'"""
+    name, probable = in_sentence(effect_title(best.name)), in_percent(look.probability(best))
+    before, after = number(look.rmse), number(look.predicted_rmse(best))
+    would = f"would bring the error from {before} to about {after} times the floor"
+    return f"Next: {name}, {probable} probable, {'explains a part of what is left' if before == after else would}."
+
+
 def answer(look: Look) -> Html:
     """The verdict in words, its warnings, and what 1 means."""
     found = look.found
     meaning = of_discovery(found)
     if look.assessment is None:
         first, others, meaning = so_far(found), ["Analysing the residual …"], "open"
-    elif not look.added and not found.faults and look.promising and not found.not_claimed:
-        # Nothing was added, of which a verdict could speak, and nothing was tried in vain.
-        left = look.assessment.left.explanation
+    elif look.promising and not found.not_claimed:  # nothing was tried in vain
         best, meaning = look.promising[0], "warning"
-        before, after = number(look.rmse), number(look.predicted_rmse(best))
-        first = (
-            f"Next: {in_sentence(effect_title(best.name))}, {in_percent(look.probability(best))} probable, would bring "
-            f"the error from {before} to about {after} times the floor."
-        )
-        others = [sentences(found)[0], *([left.sentence] if left is not None else [])]
+        first = next_step(look, best)
+        left = look.assessment.left.explanation
+        more = [left.sentence] if left is not None and not look.removable else []
+        others = [*([headline(found)] if look.removable else []), sentences(found)[0], *more]
     else:
         first, others = headline(found), sentences(found)
     return html(

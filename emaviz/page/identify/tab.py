@@ -10,6 +10,7 @@ import msgspec
 import viser
 
 from ema_model.errors import InputError, quoted
+from ema_model.faults import vector
 from ema_model.identification.run import ALGORITHMS
 from ema_model.identification.words import facts, verdict, why_best
 from ema_model.recordings import write_measurement
@@ -99,7 +100,7 @@ class IdentifyPanel:
         self._source.on_update(lambda event: event.client and page.screen.post("identify source", self._take_source))
         for tick in self._ticks.values():
             tick.on_update(lambda event: event.client and page.screen.post("algorithms", self._take_algorithms))
-        self._start.on_click(lambda _: self._begin())
+        self._start.on_click(lambda _: self.begin())
         standing.connect(self._start, self._forget_errors)
         self._watch.on_click(lambda event: page.screen.post("watch", lambda: self._watch_growing(event.client)))
         self._missing.on_click(
@@ -153,7 +154,8 @@ class IdentifyPanel:
 
     # --- the race ---------------------------------------------------------------------------------------------------
 
-    def _begin(self) -> None:
+    def begin(self) -> None:
+        """The search, as the controls say."""
         if not self._page.begins(self._page.session.identify, self._start):
             self._page.session.identifying.provenance.refused()
 
@@ -260,6 +262,9 @@ def take_to_discover(page: Page, discovering: Discovering, race: Race) -> None:
 # --- the Identify tab: the search for the faults, watched, and its answer ---------------------------------------------
 
 
+_FAULTS = {"k1": 0.25, "k2": 0.7, "k6": 0.5}  # of the example
+
+
 class IdentifyTab(Tab):
     """Leads to Explore for the next run, to Recordings for the viewer, to Discover where the model does not fit."""
 
@@ -285,6 +290,7 @@ class IdentifyTab(Tab):
             shared.strip,
             self._standing,
             lambda run: take_separating(shared.tab(ExploreTab).panel, run),
+            self._run_example,
         )
 
     def build(self) -> None:
@@ -299,6 +305,16 @@ class IdentifyTab(Tab):
             open_viewer=lambda url, name: shared.tab(RunsTab).follow(url, name),
             to_discover=partial(take_to_discover, self.page, shared.discovering),
         )
+
+    def _run_example(self) -> None:
+        """Faults that the sliders' plant then has, and their search."""
+        settings = self.page.session.settings
+        settings.set("k", list(vector(_FAULTS)))
+        settings.set("source", SLIDERS)
+        for tab in self.shared.tabs.values():
+            tab.show_settings()
+        self.page.session.refresh()
+        self.panel.begin()
 
     def place(self) -> Place:
         """The recording of the answer."""

@@ -136,7 +136,7 @@ CARDS = unescaped(
     "font-weight:600}.emaviz-card button:disabled{opacity:.45;cursor:default}"
     f".emaviz-card .alike{{color:{COLOURS['warning']}}}"
     ".emaviz-sketch{margin:0;display:flex;flex-direction:column;min-width:0}.emaviz-sketch svg{width:100%;height:auto}"
-    ".emaviz-sketch small{font-size:11px;opacity:.75;overflow:hidden;text-overflow:ellipsis;white-space:nowrap}"
+    ".emaviz-sketch small{font-size:11px;line-height:1.25;opacity:.75}"
     ".emaviz-waits{height:96px;border-radius:6px;margin-bottom:7px;background:linear-gradient(90deg,"
     "rgba(134,142,150,.1),rgba(134,142,150,.28),rgba(134,142,150,.1));background-size:200% 100%;"
     "animation:emaviz-waits 1.4s linear infinite}@keyframes emaviz-waits{to{background-position:-200% 0}}</style>"
@@ -145,8 +145,8 @@ WAITS = joined([Html('<div class="emaviz-waits"></div>')] * 3)  # where cards wi
 _PRESS = "window.emavizPress('{}')"
 _LEGEND = html(
     '<div style="opacity:.8;font-size:12px;padding-bottom:5px"><span style="color:{}">●</span> what the model lacks, '
-    '<span style="color:{}">━</span> the candidate\'s signature: where they lie together, this is it. Bar: how probable '
-    "it is that this, of all candidates, is missing.</div>",
+    '<span style="color:{}">━</span> the candidate\'s signature: where they lie together, this is it. Bar: how '
+    "probable it is that this, of all candidates, is missing.</div>",
     discovery.RESIDUAL,
     discovery.SIGNATURE,
 )
@@ -170,7 +170,6 @@ class Cards:
                 icon=viser.Icon.WAND,
                 hint="Adds, step by step, every effect and fault that the data support",
             )
-            add_html(gui, CARDS)
             self._cards = add_html(gui)
             self._opens, self._adds = ([gui.add_button(what, color="gray") for _ in range(MOST)] for what in "oa")
             add_html(gui, unseen([id_of(one) for one in (*self._opens, *self._adds)]))

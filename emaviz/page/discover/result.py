@@ -35,7 +35,7 @@ from ema_model.recordings import SIGNALS, Measurement
 from emaviz.figures import discovery
 from emaviz.figures.discovery import equation
 from emaviz.page.discover import WORKSPACE
-from emaviz.page.discover.candidate import CONFIG, WAITS, Cards, EffectView
+from emaviz.page.discover.candidate import CARDS, CONFIG, WAITS, Cards, EffectView
 from emaviz.page.panel import Example, KeepButtons, Keeps
 from emaviz.page.playback import PlaybackStrip
 from emaviz.page.window_layout import PLOTS_EARLY
@@ -207,6 +207,7 @@ class DiscoveryPanel:
         self._run_example: Callable[[], object] = lambda: None
         example = Example(page, *_EXAMPLE, lambda: self._run_example())
         self._empty = begin("No discovery yet", _STEPS, example.html)
+        add_html(gui, CARDS)
         self._headline = add_html(gui, self._empty)
         add_html(gui, PLOTS_EARLY)
         self._keep_folder = gui.add_folder("Keep it", visible=False)
@@ -337,10 +338,9 @@ class DiscoveryPanel:
 
 def looking(title: str) -> Html:
     """While there is nothing to show yet: what goes on, and what will be seen."""
-    about = (
-        "The model goes on from what it was calibrated to; then every effect and fault is held beside what it leaves."
-    )
-    return html('<div class="emaviz-cards">{}<div>{}</div>{}</div>', large(f"{title} …", "open"), about, WAITS)
+    about = "The model is calibrated, by a comparison of the same if there is one; then what it leaves is looked at."
+    told = html("<div {}>{}{}</div>", BOX, large(f"{title} …", "open"), about)
+    return html('<div class="emaviz-all-columns">{}<div class="emaviz-cards">{}</div></div>', told, WAITS)
 
 
 def next_step(look: Look, best: Candidate) -> str:

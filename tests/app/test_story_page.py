@@ -1,4 +1,4 @@
-"""The whole story in a browser, its clicks counted: a foreign file → sentence → card → ladder → held out → saved → link.
+"""The story in a browser, its clicks counted: a foreign file → sentence → card → ladder → held out → saved → link.
 
 The time that it took is printed; on two idle cores it is to stay below a minute.
 """

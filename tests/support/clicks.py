@@ -1,4 +1,4 @@
-"""Counts what a person clicks: a button, a place on a chart, a drag, an entry of a list; a list opened is a click, too."""
+"""Counts what a person clicks: a button, a place on a chart, an entry of a list; to open the list is a click, too."""
 
 from __future__ import annotations
 

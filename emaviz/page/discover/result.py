@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import io
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from contextlib import suppress
 from typing import Any
 
@@ -38,11 +38,13 @@ from emaviz.page.discover import WORKSPACE
 from emaviz.page.discover.candidate import CARDS, CONFIG, WAITS, Cards, EffectView
 from emaviz.page.panel import Example, KeepButtons, Keeps
 from emaviz.page.playback import PlaybackStrip
-from emaviz.page.window_layout import PLOTS_EARLY
+from emaviz.page.style import IN_PAIRS
+from emaviz.page.window_layout import ALL_COLUMNS, PLOTS_EARLY
 from emaviz.page.workspaces import Page
 from emaviz.scene.playback import motion
 from emaviz.session.discover import source
 from emaviz.session.discover.discovering import Discovering
+from emaviz.session.discover.history import Entry
 from emaviz.text.html import BOX, Html, add_html, begin, boxed, html, joined, note
 from emaviz.text.results import folded, large, of_discovery, shown, warned
 
@@ -163,6 +165,34 @@ def run_of(track: Track, shown: str) -> Measurement:
     return Measurement({"time_s": time_s, "motor_speed_rad_s": np.gradient(motor, time_s), **signals}, track.name)
 
 
+# --- two discoveries side by side -------------------------------------------------------------------------------------
+
+
+class SideBySide:
+    """A folder over the whole width, there while another discovery is chosen to stand beside the one that is shown."""
+
+    def __init__(self, page: Page) -> None:
+        gui = page.server.gui
+        self._folder = gui.add_folder("Side by side", visible=False)
+        with self._folder:
+            add_html(gui, IN_PAIRS + ALL_COLUMNS)
+            self._told = [add_html(gui) for _ in range(2)]
+            self._ladders = [gui.add_plotly(go.Figure(), config=CONFIG, aspect=0.5) for _ in range(2)]
+
+    def show(self, both: Sequence[Entry]) -> None:
+        """Two that have a picture; of fewer nothing is shown."""
+        looks = [(one, one.look) for one in both if one.look is not None]
+        self._folder.visible = len(looks) == 2
+        if not self._folder.visible:
+            return
+        for (entry, look), told, ladder in zip(looks, self._told, self._ladders):
+            title = html("<b>{}. {}</b>", entry.number, entry.subject)
+            found = boxed(equation(look.found, look.added)) if look.removable else Html()
+            said = large(headline(look.found), of_discovery(look.found))
+            told.content = html("<div {}>{}{}{}</div>", BOX, title, said, found)
+            ladder.figure = discovery.error_ladder(look.found)
+
+
 # --- discover's panel on the right ------------------------------------------------------------------------------------
 # Discover's panel on the right: the answer so far, the ladder, the opened candidate, the equation, what is left.
 
@@ -209,6 +239,7 @@ class DiscoveryPanel:
         self._empty = begin("No discovery yet", _STEPS, example.html)
         add_html(gui, CARDS)
         self._headline = add_html(gui, self._empty)
+        self.beside = SideBySide(page)
         add_html(gui, PLOTS_EARLY)
         self._keep_folder = gui.add_folder("Keep it", visible=False)
         with self._keep_folder:  # where it is seen without scrolling

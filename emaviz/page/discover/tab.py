@@ -20,7 +20,7 @@ from ema_model.faults import CAUSES
 from ema_model.quantities.numbers import number
 from emaviz.page.discover import WORKSPACE, candidate
 from emaviz.page.discover.candidate import OwnEffect
-from emaviz.page.discover.result import HOME, DiscoveryPanel
+from emaviz.page.discover.result import HOME, DiscoveryPanel, SideBySide
 from emaviz.page.explore.tab import ExploreTab, take_experiment
 from emaviz.page.panel import JobLine, KeepButtons, Keeps, Lead, Leads
 from emaviz.page.share import Place
@@ -260,18 +260,22 @@ class Guide:
 
 # --- the discoveries so far, to go from one to the other --------------------------------------------------------------
 
-_NEW = "New"
+_NEW, _ALONE = "New", "–"
 
 
 class EntriesControl:
-    """A dropdown, there once something was discovered."""
+    """A dropdown, there once something was discovered, and one for a second that is to stand beside the first."""
 
-    def __init__(self, page: Page, discovering: Discovering) -> None:
-        self._page, self._discovering = page, discovering
+    def __init__(self, page: Page, discovering: Discovering, beside: SideBySide) -> None:
+        self._page, self._discovering, self._both = page, discovering, beside
         self._choice: Any = page.server.gui.add_dropdown(
             "Discovery", (_NEW,), visible=False, hint="Each is kept as it was left, and comes back at once"
         )
+        self._beside: Any = page.server.gui.add_dropdown(
+            "Beside", (_ALONE,), visible=False, hint="Another discovery, side by side with this one"
+        )
         self._choice.on_update(self._changed)
+        self._beside.on_update(lambda event: event.client and page.screen.post("beside", self._show_both))
 
     def show(self) -> None:
         """The list as it is now; on the screen's thread."""
@@ -283,6 +287,18 @@ class EntriesControl:
         if self._choice.value != current:
             self._choice.value = current
         self._choice.visible = bool(entries.all)
+        others = [one.words for one in reversed(entries.all) if one.look is not None and one is not entries.current]
+        if list(self._beside.options) != [_ALONE, *others]:
+            chosen = str(self._beside.value)
+            self._beside.options = [_ALONE, *others]
+            self._beside.value = chosen if chosen in others else _ALONE
+        self._beside.visible = bool(others) and entries.current is not None
+        self._show_both()
+
+    def _show_both(self) -> None:
+        entries = self._discovering.entries
+        other = next((one for one in entries.all if one.words == str(self._beside.value)), None)
+        self._both.show([one for one in (entries.current, other) if one is not None])
 
     def busy(self, busy: bool) -> None:
         """Whether a step runs."""
@@ -382,7 +398,7 @@ class DiscoverPanel:
         self._look: Look | None = None
         self._opened: str | None = None
         gui = page.server.gui
-        self._entries = EntriesControl(page, discovering)
+        self._entries = EntriesControl(page, discovering, result.beside)
         self._guide = Guide(page, discovering, lambda: self.source.choose_first())
         self.source = SourceControls(page, discovering, uploads, self._chosen, self._source_shown)
         self._start = gui.add_button("Start", icon=viser.Icon.PLAYER_PLAY)

@@ -305,6 +305,7 @@ class IdentifyTab(Tab):
             open_viewer=lambda url, name: shared.tab(RunsTab).follow(url, name),
             to_discover=partial(take_to_discover, self.page, shared.discovering),
         )
+        shared.tab(RunsTab).result.run_example = self._run_example
 
     def _run_example(self) -> None:
         """Faults that the sliders' plant then has, and their search."""

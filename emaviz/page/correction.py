@@ -26,7 +26,7 @@ _STYLE = unescaped(
     ".emaviz-flow a[aria-disabled]{cursor:default;opacity:.55}.emaviz-flow .done{border-top-color:#0c8599}"
     ".emaviz-flow .next{border-top-color:#f08c00;background:rgba(240,140,0,.14)}"
     ".emaviz-flow .here{outline:1.5px solid currentColor;outline-offset:-1.5px}"
-    ".emaviz-flow span{display:block;opacity:.75;overflow:hidden;text-overflow:ellipsis;white-space:nowrap}</style>"
+    ".emaviz-flow span{display:block;opacity:.75;overflow-wrap:anywhere}</style>"
 )
 
 
@@ -56,7 +56,8 @@ def stages(discovering: Discovering) -> tuple[Stage, ...]:
         fit = Stage(f"error {number(compared.over_floor)} × floor", comparing.finished is not None)
     elif comparing.running:
         fit = Stage("calibrating …")
-    missing, improved = Stage("–", can=look is not None or compared is not None), Stage("–", can=look is not None)
+    can = look is not None or compared is not None
+    missing, improved = Stage("click to look" if can else "–", can=can), Stage("–", can=look is not None)
     if look is not None:
         known, count = look.assessment is not None, len(look.promising)
         told = f"{count} candidate{'' if count == 1 else 's'}" if count else "nothing more"

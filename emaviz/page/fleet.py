@@ -17,7 +17,7 @@ from emaviz.page.window_layout import COLUMNS, NEXT_COLUMN, PLOTS_EARLY
 from emaviz.page.workspaces import Page, Workspace
 from emaviz.session.fleet import TYPE, ComparingUnits
 from emaviz.session.session_file import Part
-from emaviz.text.html import BOX, DIM, Html, add_html, begin, html, joined, note
+from emaviz.text.html import BOX, DIM, Html, add_html, begin, html, joined, note, waiting
 from emaviz.text.results import MEANINGS, begun, of_units, warned, whole
 
 # --- what stays of compared units: the report, and the type as an actuator's file -------------------------------------
@@ -61,6 +61,9 @@ _HEAD_PX, _ROW_PX, _FEWEST_ROWS = 110, 34, 4  # of the matrix
 _EXAMPLE = "Run an example", "Six units of one type, of which two differ: made in the data folder, then compared."
 
 
+_WAITING = "One model is fitted to all units; then a parameter is let go where a unit differs."
+
+
 class UnitsResult:
     """Everything here is built and changed on the screen's thread."""
 
@@ -88,6 +91,11 @@ class UnitsResult:
         with self._figures:
             add_html(gui, NEXT_COLUMN)
             self._parameters: Any = gui.add_plotly(go.Figure(), config=_CONFIG, aspect=1.0)
+
+    def busy(self, busy: bool) -> None:
+        """Whether a run goes on: where there is no answer yet, it is said that it does."""
+        if self._comparing.found is None:
+            self._told.content = waiting(self._comparing.job.title, _WAITING) if busy else self._empty
 
     def show(self, found: UnitsCompared | None) -> None:
         """An answer; None for none."""
@@ -236,6 +244,7 @@ class UnitsPanel:
             self._line.say("")
 
     def _busy(self, busy: bool) -> None:
+        self._result.busy(busy)
         if busy:
             self._practice.fold()
         with self._page.server.atomic():

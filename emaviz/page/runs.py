@@ -38,6 +38,7 @@ from emaviz.session.jobs import Worker
 from emaviz.session.recorded_runs import RecordedRuns
 from emaviz.session.session_file import Part
 from emaviz.text.html import Html, add_html, begin, boxed, html, joined, said
+from emaviz.text.terms import explained
 
 # --- everything on the page as one file: saved to the data folder and to the browser, loaded from either --------------
 
@@ -489,7 +490,7 @@ def _card(entry: Entry) -> Html:
         html(
             "<div>{} {}{}</div>",
             named(name),
-            _result(answer, entry.found.values()),
+            explained(_result(answer, entry.found.values())),
             " ★" if name == entry.best and len(entry.found) > 1 else "",
         )
         for name, answer in entry.found.items()
@@ -535,7 +536,7 @@ def _listed(entries: list[Entry]) -> Html:
                 '<div style="padding:2px 0;overflow-wrap:anywhere">{}<div style="opacity:.75;font-size:11.5px">{}</div>'
                 "</div>",
                 entry.name,
-                says,
+                explained(says),
             )
         )
     return html("<div {}>{}</div>", _BOX, joined(rows))

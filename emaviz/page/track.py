@@ -46,7 +46,7 @@ from emaviz.session.compare import Comparing
 from emaviz.session.jobs import Worker
 from emaviz.session.session_file import Part
 from emaviz.session.track import Following
-from emaviz.text.html import BOX, DIM, Html, add_html, begin, boxed, html, joined, note
+from emaviz.text.html import BOX, DIM, Html, add_html, begin, boxed, html, joined, note, waiting
 from emaviz.text.results import warned, whole
 
 # --- a click on a flight in its chart ---------------------------------------------------------------------------------
@@ -158,6 +158,9 @@ _SO_FAR_ASPECT = 0.45  # of the figure of flights that are too few to follow
 _EXAMPLE = "Run an example", "A life of sixty flights, with its threshold: made in the data folder, then tracked."
 
 
+_TITLE, _WAITING = "Identifying the flights", "The first are drawn as soon as they are identified."
+
+
 class TrackResult:
     """Drawn on the slow screen's thread while "today" is dragged, else on the screen's."""
 
@@ -203,6 +206,11 @@ class TrackResult:
             self._kept = keep()
         self._today.on_update(lambda event: event.client and slow.post("today", self._draw))
         self._fault.on_update(lambda event: event.client and self._choose())
+
+    def busy(self, busy: bool) -> None:
+        """Whether a run goes on: where no flight is shown yet, it is said that it does."""
+        if self._told.content in (self._empty, waiting(_TITLE, _WAITING)):
+            self._told.content = waiting(_TITLE, _WAITING) if busy else self._empty
 
     def show_first(self, flights: Sequence[Flight], count: int) -> None:
         """The first flights, before there are enough to follow; count: in all."""
@@ -481,6 +489,7 @@ class TrackPanel:
             self._line.say("")
 
     def _busy(self, busy: bool) -> None:
+        self._result.busy(busy)
         if busy:
             self._practice.fold()
         with self._page.server.atomic():

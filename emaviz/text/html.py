@@ -219,6 +219,15 @@ def begin(title: str, steps: Sequence[str], example: Html | None = None) -> Html
     )
 
 
+WAITS = joined([Html('<div class="emaviz-waits"></div>')] * 3)  # where parts of a result will stand
+
+
+def waiting(title: str, about: str) -> Html:
+    """Where a result will be, while it is computed: what goes on, and a picture that moves."""
+    head = html('<div style="font-size:16px;font-weight:600;padding:4px 0">{} …</div>', title)
+    return html('<div class="emaviz-all-columns"><div {}>{}{}</div>{}</div>', BOX, head, about, WAITS)
+
+
 def boxed(content: str) -> Html:
     """Plain text or HTML, as wide as the controls' names."""
     return html("<div {}>{}</div>", BOX, content)

@@ -23,6 +23,7 @@ from emaviz.text.html import Html, add_html, html, joined, unescaped
 # Short pieces of HTML on the Compare tab: the list of recordings, the data health card.
 
 _MARKS = {"good": ("✓", COLOURS["good"]), "note": ("●", COLOURS["note"]), "warning": ("▲", COLOURS["warning"])}
+_SAYS = {"good": "in order", "note": "something to know of the data", "warning": "look at the data's health"}
 _CARDS_BOX = Html('style="padding:0 10px 6px;font-size:12.5px;line-height:1.4"')
 _DIM = Html('style="opacity:.65"')
 
@@ -66,7 +67,7 @@ def _finding(finding: Finding) -> Html:
 
 def _mark(severity: str) -> Html:
     sign, colour = _MARKS[severity]
-    return html('<span style="color:{}" title="{}">{}</span>', colour, severity, sign)
+    return html('<span style="color:{}" title="{}">{}</span>', colour, _SAYS[severity], sign)
 
 
 # --- the first lines of a text as they stand in the file --------------------------------------------------------------

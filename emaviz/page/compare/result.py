@@ -37,6 +37,7 @@ from emaviz.server.viser_private import selector_of
 from emaviz.session.files import Opened
 from emaviz.text.html import Html, add_html, begin, html, joined, note, unescaped
 from emaviz.text.results import folded, large, of_comparison, shown, warned
+from emaviz.text.terms import explained
 
 # --- a compared recording on the 3D actuator: as measured, the screw glowing where the model fails --------------------
 
@@ -530,21 +531,25 @@ def headline(comparison: Comparison) -> Html:
     """The sentences."""
     first, *others = comparison.sentences or ("",)
     regions = {region.sentence for region in comparison.worst_regions}  # which stand in their own list
-    return html(
-        "<div {}>{}{}{}</div>",
-        _BOX,
-        large(first, of_comparison(comparison)),
-        joined(html("<div>{}</div>", text) for text in [*others, of_floor(comparison)] if text not in regions),
-        warned(comparison.warnings),
+    return explained(
+        html(
+            "<div {}>{}{}{}</div>",
+            _BOX,
+            large(first, of_comparison(comparison)),
+            joined(html("<div>{}</div>", text) for text in [*others, of_floor(comparison)] if text not in regions),
+            warned(comparison.warnings),
+        )
     )
 
 
 def numbers(comparison: Comparison) -> Html:
     """For each signal, error against floor."""
-    return html(
-        "<div {}>{}{}{}</div>",
-        _BOX,
-        shown(errors(comparison)),
-        html('<div style="opacity:.8;font-size:12.5px">{}</div>', FLOOR_NOTE),
-        folded("Each measurement", errors_by_recording(comparison, comparison.primary)),
+    return explained(
+        html(
+            "<div {}>{}{}{}</div>",
+            _BOX,
+            shown(errors(comparison)),
+            html('<div style="opacity:.8;font-size:12.5px">{}</div>', FLOOR_NOTE),
+            folded("Each measurement", errors_by_recording(comparison, comparison.primary)),
+        )
     )

@@ -244,6 +244,7 @@ class HeldOutControls:
         self._folder = gui.add_folder("Hold out for validation", visible=False)
         self._boxes: dict[str, Any] = {}
         with self._folder:
+            add_html(gui, LONG_LABELS)
             self._told = add_html(gui)
             self._take = gui.add_button("Hold it out", icon=viser.Icon.EYE_OFF, visible=False)
         self._take.on_click(lambda _: page.screen.post("proposal", self._take_proposal))

@@ -35,7 +35,8 @@ from emaviz.page.workspaces import Page
 from emaviz.server.viser_private import id_of
 from emaviz.session.discover.discovering import Discovering, Preview, Typed, typed
 from emaviz.session.settings import number as setting_number
-from emaviz.text.html import BOX, Html, add_html, boxed, html, joined, mathml, note, unescaped
+from emaviz.text.html import BOX, WAITS, Html, add_html, boxed, html, joined, mathml, note, unescaped
+from emaviz.text.terms import explained
 
 # --- texts and styles of the Discover tab's cards: what each candidate would do, in one glance ------------------------
 
@@ -122,7 +123,7 @@ _BUTTON = (
 )
 CARDS = unescaped(
     "<style>.emaviz-cards{padding:0 8px 2px;font-size:13px;line-height:1.4}"
-    ".emaviz-card{position:relative;display:grid;grid-template-columns:minmax(0,1fr) minmax(120px,44%);gap:2px 12px;"
+    ".emaviz-card{position:relative;display:grid;grid-template-columns:minmax(0,1fr) minmax(120px,240px);gap:2px 12px;"
     "padding:7px 10px 9px;margin-bottom:7px;border-radius:6px;border:1px solid rgba(134,142,150,.35);"
     "border-left:4px solid rgba(134,142,150,.6);background:rgba(134,142,150,.08)}"
     ".emaviz-card.open{border-left-color:#f08c00}"
@@ -137,11 +138,8 @@ CARDS = unescaped(
     f".emaviz-card .alike{{color:{COLOURS['warning']}}}"
     ".emaviz-sketch{margin:0;display:flex;flex-direction:column;min-width:0}.emaviz-sketch svg{width:100%;height:auto}"
     ".emaviz-sketch small{font-size:11px;line-height:1.25;opacity:.75}"
-    ".emaviz-waits{height:96px;border-radius:6px;margin-bottom:7px;background:linear-gradient(90deg,"
-    "rgba(134,142,150,.1),rgba(134,142,150,.28),rgba(134,142,150,.1));background-size:200% 100%;"
-    "animation:emaviz-waits 1.4s linear infinite}@keyframes emaviz-waits{to{background-position:-200% 0}}</style>"
+    "</style>"
 )
-WAITS = joined([Html('<div class="emaviz-waits"></div>')] * 3)  # where cards will stand
 _PRESS = "window.emavizPress('{}')"
 _LEGEND = html(
     '<div style="opacity:.8;font-size:12px;padding-bottom:5px"><span style="color:{}">●</span> what the model lacks, '
@@ -249,7 +247,10 @@ class Cards:
             title,
             in_percent(probable),
             100.0 * probable,
-            joined(html("<div>{}</div>", line) for line in (fall(look, one), strength(look, one), share(look, one))),
+            joined(
+                html("<div>{}</div>", line)
+                for line in (explained(fall(look, one)), strength(look, one), share(look, one))
+            ),
             html('<div class="alike">▲ These recordings cannot tell it from {}.</div>', rivals) if rivals else "",
             _PRESS.format(id_of(self._adds[place])),
             title,

@@ -35,7 +35,7 @@ from ema_model.recordings import SIGNALS, Measurement
 from emaviz.figures import discovery
 from emaviz.figures.discovery import equation
 from emaviz.page.discover import WORKSPACE
-from emaviz.page.discover.candidate import CARDS, CONFIG, WAITS, Cards, EffectView
+from emaviz.page.discover.candidate import CARDS, CONFIG, Cards, EffectView
 from emaviz.page.panel import Example, KeepButtons, Keeps
 from emaviz.page.playback import PlaybackStrip
 from emaviz.page.style import IN_PAIRS
@@ -45,8 +45,9 @@ from emaviz.scene.playback import motion
 from emaviz.session.discover import source
 from emaviz.session.discover.discovering import Discovering
 from emaviz.session.discover.history import Entry
-from emaviz.text.html import BOX, Html, add_html, begin, boxed, html, joined, note
+from emaviz.text.html import BOX, Html, add_html, begin, boxed, html, joined, note, waiting
 from emaviz.text.results import folded, large, of_discovery, shown, warned
+from emaviz.text.terms import explained
 
 # --- suggested next test: the command and load that tell rivals apart; into Explore, or as CSV for a rig --------------
 
@@ -205,6 +206,7 @@ _STEPS = (
     "Add an effect: the error falls, also on what was held out. Then save the improved model, or use it in Explore.",
 )
 _EXAMPLE = "Run an example", "The first bench run of an actuator: three recordings, and one that is held out."
+_WAITING = "The model is calibrated, by a comparison of the same if there is one; then what it leaves is looked at."
 HOME = Keeps(
     "Take it home",
     ".zip",
@@ -287,7 +289,7 @@ class DiscoveryPanel:
     def busy(self, busy: bool) -> None:
         """Whether a step runs."""
         if self._look is None:
-            self._headline.content = looking(self._discovering.job.title) if busy else self._empty
+            self._headline.content = waiting(self._discovering.job.title, _WAITING) if busy else self._empty
         self._effect.busy(busy)
         self._cards.busy(busy)
         self._next.busy(busy)
@@ -313,7 +315,9 @@ class DiscoveryPanel:
         if not self._discovering.source.revealed:
             self._truth.content = ""
         if look is None:
-            self._headline.content = looking(self._discovering.job.title) if self._discovering.running else self._empty
+            self._headline.content = (
+                waiting(self._discovering.job.title, _WAITING) if self._discovering.running else self._empty
+            )
             self._actuator.refresh()
             return
         found = look.found
@@ -367,13 +371,6 @@ class DiscoveryPanel:
             self._discovering.events.revealed()
 
 
-def looking(title: str) -> Html:
-    """While there is nothing to show yet: what goes on, and what will be seen."""
-    about = "The model is calibrated, by a comparison of the same if there is one; then what it leaves is looked at."
-    told = html("<div {}>{}{}</div>", BOX, large(f"{title} …", "open"), about)
-    return html('<div class="emaviz-all-columns">{}<div class="emaviz-cards">{}</div></div>', told, WAITS)
-
-
 def next_step(look: Look, best: Candidate) -> str:
     """'Next: cogging torque, 97 % probable, would bring the error from 3.47 to about 2.98 times the floor.'"""
     name, probable = in_sentence(effect_title(best.name)), in_percent(look.probability(best))
@@ -387,7 +384,12 @@ def answer(look: Look) -> Html:
     found = look.found
     meaning = of_discovery(found)
     if look.assessment is None:
-        first, others, meaning = so_far(found), ["Analysing the residual …"], "open"
+        first, _, more = so_far(found).partition(". ")
+        first, others, meaning = (
+            f"{first.rstrip('.')}.",
+            [*([more] if more else []), "Analysing the residual …"],
+            "open",
+        )
     elif look.promising and not found.not_claimed:  # nothing was tried in vain
         best, meaning = look.promising[0], "warning"
         first = next_step(look, best)
@@ -396,13 +398,15 @@ def answer(look: Look) -> Html:
         others = [*([headline(found)] if look.removable else []), sentences(found)[0], *more]
     else:
         first, others = headline(found), sentences(found)
-    return html(
-        '<div {}>{}{}{}<div style="opacity:.65;font-size:12px" title="{}">The floor is what noise and the model\'s own '
-        "limits leave: 1 on the ladder.</div>{}</div>",
-        BOX,
-        large(first, meaning),
-        joined(html("<div>{}</div>", text) for text in others),
-        warned(found.warnings),
-        FLOOR_NOTE,
-        folded("Each measurement", per_recording(found)),
+    return explained(
+        html(
+            '<div {}>{}{}{}<div style="opacity:.65;font-size:12px" title="{}">The floor is what noise and the model\'s '
+            "own limits leave: 1 on the ladder.</div>{}</div>",
+            BOX,
+            large(first, meaning),
+            joined(html("<div>{}</div>", text) for text in others),
+            warned(found.warnings),
+            FLOOR_NOTE,
+            folded("Each measurement", per_recording(found)),
+        )
     )

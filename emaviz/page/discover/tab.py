@@ -65,7 +65,9 @@ class SourceControls:
         }
         self._names = self._listed()
         gui, post = page.server.gui, page.screen.post
-        self._source = gui.add_dropdown("Measurements", tuple(self._names), hint="Of Compare, or of a challenge")
+        self._source = gui.add_dropdown(
+            "Measurements", tuple(self._names), hint="Of Compare, or of a challenge: ● to ●●●●● say how hard"
+        )
         uploads.add_button("Open a sealed challenge", CHALLENGE_SUFFIX, icon=viser.Icon.LOCK_OPEN, color="gray")
         self._about = add_html(gui)
         self._source.on_update(lambda event: event.client and post("source", self._take))

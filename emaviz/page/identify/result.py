@@ -25,7 +25,7 @@ from emaviz.page.workspaces import Page
 from emaviz.scene.playback import PLAYED, motion
 from emaviz.session.identify import Frame, Landscapes, Race, Track, ends
 from emaviz.session.jobs import Worker
-from emaviz.text.html import Html, add_html, begin, joined, note
+from emaviz.text.html import Html, add_html, begin, joined, note, waiting
 from emaviz.text.results import sure_words
 
 # --- how the swarm is looked at ---------------------------------------------------------------------------------------
@@ -272,6 +272,9 @@ _MOST_ROWS = 200
 _EXAMPLE = "Run an example", "Friction, backlash and eccentricity are set on Explore's sliders, and found again."
 
 
+_WAITING = "The model is run for a population of faults until its current is the measured one."
+
+
 class IdentifyResult:
     """Drawn on the screen's thread, what changes slowly on the slow one's; strip: its clock, for what is identified."""
 
@@ -297,7 +300,8 @@ class IdentifyResult:
             standing.add(gui)
             add_html(gui, COLUMNS)
             shipped = Example(page, *_EXAMPLE, example)
-            self._empty: Any = add_html(gui, begin("Nothing is identified yet", _STEPS, shipped.html))
+            self._nothing = begin("Nothing is identified yet", _STEPS, shipped.html)
+            self._empty: Any = add_html(gui, self._nothing)
             self._convergence = LiveConvergence(gui)
             self._convergence.handle.visible = False
             page.workspaces.heights.add([self._convergence.handle], spare_px=160, beside_px=332)
@@ -404,6 +408,11 @@ class IdentifyResult:
         if self._empty.visible:
             self._empty.visible, self._convergence.handle.visible = False, True
             self._swarm.appear()
+
+    def busy(self, busy: bool) -> None:
+        """Whether a search goes on: until it has told something, it is said that it does."""
+        if self._empty.visible:
+            self._empty.content = waiting("Searching for the faults", _WAITING) if busy else self._nothing
 
     def _draw(self, race: Race, soon: bool) -> None:
         begun = race is not self._begun

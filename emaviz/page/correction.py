@@ -18,7 +18,7 @@ from emaviz.session.discover.discovering import Discovering
 from emaviz.text.html import Html, HtmlPiece, add_html, html, joined, unescaped
 
 COLUMNS, FIT, MISSING, IMPROVED = range(4)
-TITLES = ("Columns", "Fit and regions", "What is missing", "Ladder and improved model")
+TITLES = ("Columns", "Fit and regions", "What is missing", "Ladder and model")
 _STYLE = unescaped(
     "<style>.emaviz-flow{display:flex;gap:4px;padding:4px 10px 6px;font-size:12.5px;line-height:1.25}"
     ".emaviz-flow a{flex:1 1 0;min-width:0;font:inherit;color:inherit;text-align:left;cursor:pointer;"

@@ -84,7 +84,7 @@ def test_from_a_foreign_file_to_a_shared_link(page, app, foreign):
     amplitude = discovering.look.added[0].parameters["amplitude_Nm"].value
     assert amplitude == pytest.approx(0.02, rel=0.1)
     page.get_by_text("The model lacks cogging torque").first.wait_for()
-    page.get_by_role("link", name="4 Ladder and improved model ✓").wait_for()
+    page.get_by_role("link", name="4 Ladder and model ✓").wait_for()
 
     with page.expect_download() as saved:
         clicks.click(page.get_by_role("button", name="Save model"))

@@ -329,11 +329,11 @@ class ResultPanel:
         gui = page.server.gui
         self._empty = begin("Nothing is compared yet", _STEPS, Example(page, *_EXAMPLE, example).html)
         self._headline = add_html(gui, self._empty)
+        add_html(gui, PLOTS_EARLY)
         self._next = gui.add_folder("Next", visible=False)
-        with self._next:  # below the answer, where it is seen however much is answered
+        with self._next:
             add_html(gui, IN_PAIRS)
             leads()
-        add_html(gui, PLOTS_EARLY)
         self._numbers = add_html(gui, visible=False)
         self._place = gui.add_folder("The file's columns", visible=False)
         with self._place:

@@ -39,14 +39,16 @@ class Stage:
     can: bool = True  # whether it can be gone to
 
 
-def stages(discovering: Discovering) -> tuple[Stage, ...]:
-    """The four of them, as the session stands."""
-    comparing, look = discovering.comparing, discovering.look
+def stages(discovering: Discovering, of_compare: bool) -> tuple[Stage, ...]:
+    """The four of them, as the session stands; of_compare: of its recordings, whatever is discovered meanwhile."""
+    comparing, challenge = discovering.comparing, discovering.source.challenge
+    aside = of_compare and challenge is not None  # Discover has a challenge
+    challenge, look = None if aside else challenge, None if aside else discovering.look
     opened = list(comparing.opened.values())
     unclear = [one for one in opened if one.measurement is None]
     held = sum(one.name in comparing.held_out for one in opened)
     files = f"{len(opened)} measurement{'' if len(opened) == 1 else 's'}{f', {held} held out' if held else ''}"
-    compared, challenge = comparing.comparison, discovering.source.challenge
+    compared = comparing.comparison
     columns = Stage("to be checked" if unclear else files if opened else "no file yet", bool(opened) and not unclear)
     fit = Stage("–", can=bool(opened))
     if challenge is not None:
@@ -66,7 +68,7 @@ def stages(discovering: Discovering) -> tuple[Stage, ...]:
             unseen = look.found.ladder[-1].holdout_rmse
             also = "" if unseen is None else f", held out {number(unseen)}"
             improved = Stage(f"{number(look.rmse)}{also} × floor", look.found.at_floor)
-    elif discovering.running:
+    elif discovering.running and not aside:
         missing = Stage("looking …")
     return columns, fit, missing, improved
 
@@ -98,10 +100,10 @@ class Correction:
 
     def refresh(self) -> None:
         """As the session stands now."""
-        found = stages(self._discovering)
-        following = next((i for i, one in enumerate(found) if not one.done), None)
         for workspace, piece in self._lines:
-            content = _line(found, following, self._at(workspace), self._way)
+            found = stages(self._discovering, workspace == "compare")
+            following = next((i for i, one in enumerate(found) if not one.done), None)
+            content = _line(found, following, self._at(workspace), lambda step, at=workspace: self._way(step, at))
             if piece.content != content:
                 piece.content = content
 
@@ -112,12 +114,14 @@ class Correction:
             return (FIT,) if self._discovering.comparing.comparison is not None else (COLUMNS,)
         return (MISSING, IMPROVED) if look is not None and look.removable else (MISSING,)
 
-    def _way(self, step: int) -> str:
+    def _way(self, step: int, workspace: str) -> str:
+        """What a click on a step runs: it goes to its workspace, and presses there what shows it, or begins it."""
         to = "compare" if step in (COLUMNS, FIT) else "discover"
         go = f"window.emavizViews?.go({json.dumps(to)})"
-        if step == MISSING and self._discovering.look is not None:
+        begun = self._discovering.is_of_compare or (workspace == to and self._discovering.look is not None)
+        if step not in self._ways or (step == MISSING and begun):
             return go
-        return f"{go};{self._ways[step]}" if step in self._ways and step != MISSING else self._ways.get(step, go)
+        return self._ways[step] if step == MISSING else f"{go};{self._ways[step]}"  # whose button goes there itself
 
 
 def _line(found: tuple[Stage, ...], following: int | None, here: tuple[int, ...], way: Callable[[int], str]) -> Html:

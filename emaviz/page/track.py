@@ -155,7 +155,7 @@ _ASPECTS = (0.66, 0.42, 0.48)  # of the figures, height over width: the first st
 _SO_FAR_ASPECT = 0.45  # of the figure of flights that are too few to follow
 
 
-_EXAMPLE = "Run an example", "A life of sixty flights, with its threshold: made in the data folder, then tracked."
+_EXAMPLE = "Run an example", "A life of sixty flights: made in the data folder, then tracked, which takes some minutes."
 
 
 _TITLE, _WAITING = "Identifying the flights", "The first are drawn as soon as they are identified."

@@ -201,7 +201,7 @@ def test_a_discovery_is_gone_back_to_without_computing_and_is_used_in_explore(ta
     tab.get_by_role("option", name=entry.words).click()
     wait_until(lambda: discovering.entries.current is entry)
     assert discovering.look is first and not discovering.running, "as it was left, and nothing is computed"
-    tab.get_by_text("physics is missing").first.wait_for()
+    tab.get_by_text("Next: ").first.wait_for()
 
     tab.get_by_role("button", name="Use in Explore").click()
     tab.get_by_role("tab", name="Signals", exact=True).wait_for()

@@ -531,14 +531,12 @@ def headline(comparison: Comparison) -> Html:
     """The sentences."""
     first, *others = comparison.sentences or ("",)
     regions = {region.sentence for region in comparison.worst_regions}  # which stand in their own list
-    return explained(
-        html(
-            "<div {}>{}{}{}</div>",
-            _BOX,
-            large(first, of_comparison(comparison)),
-            joined(html("<div>{}</div>", text) for text in [*others, of_floor(comparison)] if text not in regions),
-            warned(comparison.warnings),
-        )
+    told = [html("<div>{}</div>", text) for text in [*others, of_floor(comparison)] if text not in regions]
+    return html(
+        "<div {}>{}{}</div>",
+        _BOX,
+        large(first, of_comparison(comparison)),
+        explained(joined([*told, warned(comparison.warnings)])),
     )
 
 

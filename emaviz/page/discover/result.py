@@ -398,15 +398,13 @@ def answer(look: Look) -> Html:
         others = [*([headline(found)] if look.removable else []), sentences(found)[0], *more]
     else:
         first, others = headline(found), sentences(found)
-    return explained(
-        html(
-            '<div {}>{}{}{}<div style="opacity:.65;font-size:12px" title="{}">The floor is what noise and the model\'s '
-            "own limits leave: 1 on the ladder.</div>{}</div>",
-            BOX,
-            large(first, meaning),
-            joined(html("<div>{}</div>", text) for text in others),
-            warned(found.warnings),
-            FLOOR_NOTE,
-            folded("Each measurement", per_recording(found)),
-        )
+    told = joined([*(html("<div>{}</div>", text) for text in others), warned(found.warnings)])
+    return html(
+        '<div {}>{}{}<div style="opacity:.65;font-size:12px" title="{}">The floor is what noise and the model\'s own '
+        "limits leave: 1 on the ladder.</div>{}</div>",
+        BOX,
+        large(first, meaning),
+        explained(told),
+        FLOOR_NOTE,
+        folded("Each measurement", per_recording(found)),
     )

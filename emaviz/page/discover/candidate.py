@@ -169,7 +169,9 @@ class Cards:
                 hint="Adds, step by step, every effect and fault that the data support",
             )
             self._cards = add_html(gui)
-            self._opens, self._adds = ([gui.add_button(what, color="gray") for _ in range(MOST)] for what in "oa")
+            self._opens, self._adds = (  # which nobody sees: the cards press them
+                [gui.add_button(f"{what} {place + 1}") for place in range(MOST)] for what in ("Open card", "Add card")
+            )
             add_html(gui, unseen([id_of(one) for one in (*self._opens, *self._adds)]))
 
     def connect(self, ask: Callable[[Callable[[], bool], Any, str], None], open_card: Callable[[str], None]) -> None:

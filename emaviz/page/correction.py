@@ -52,7 +52,7 @@ def stages(discovering: Discovering, of_compare: bool) -> tuple[Stage, ...]:
     columns = Stage("to be checked" if unclear else files if opened else "no file yet", bool(opened) and not unclear)
     fit = Stage("–", can=bool(opened))
     if challenge is not None:
-        columns = Stage(f"of the challenge {challenge.title}", True, bool(opened))
+        columns = Stage("of a challenge", True, bool(opened))
         fit = Stage("calibrated" if look is not None else "–", look is not None, bool(opened))
     elif compared is not None:
         fit = Stage(f"error {number(compared.over_floor)} × floor", comparing.finished is not None)

@@ -334,7 +334,6 @@ class ResultPanel:
         with self._next:
             add_html(gui, IN_PAIRS)
             leads()
-        self._numbers = add_html(gui, visible=False)
         self._place = gui.add_folder("The file's columns", visible=False)
         with self._place:
             add_html(gui, ALL_COLUMNS)
@@ -345,6 +344,7 @@ class ResultPanel:
         with self._answer:
             self._hint = add_html(gui)
             self._style = add_html(gui)
+        self._numbers = add_html(gui, visible=False)  # after the sentences
         self._evidence = gui.add_folder("What the residual depends on", visible=False)
         self._plots_folder = gui.add_folder("Plots", visible=False)
         with self._plots_folder:

@@ -541,14 +541,15 @@ _LEAST_SPAN = 1e-30
 
 def sketch(figure: go.Figure) -> Html:
     """A figure's lines and points as a small SVG with the range of its axes beside them; nothing where it has none."""
+    lines: tuple[Any, ...] = tuple(figure.data)
     traces = [
         (trace, np.asarray(trace.x, dtype=float), np.asarray(trace.y, dtype=float))
-        for trace in figure.data
+        for trace in lines
         if trace.x is not None and len(trace.x)
     ]
-    if not traces:
-        return Html()
     points = [(x[good], y[good]) for _, x, y in traces if (good := np.isfinite(x) & np.isfinite(y)).any()]
+    if not points:
+        return Html()
     every_x, every_y = (np.concatenate(parts) for parts in zip(*points))
     left, right = float(every_x.min()), float(every_x.max())
     low, high = min(float(every_y.min()), 0.0), max(float(every_y.max()), 0.0)

@@ -9,7 +9,7 @@ from support.rig import Rig
 
 from ema_model.errors import InputError
 from ema_model.recordings import Measurement, write_measurement
-from emaviz.session.compare import called_held_out, proposed
+from emaviz.session.compare import HoldOut, called_held_out, proposed
 
 TIME = np.arange(0.0, 0.2, 1e-3)
 
@@ -38,9 +38,9 @@ def test_a_name_says_that_a_file_is_not_to_be_fitted(names, held):
 def test_of_several_one_is_proposed():
     small, large, larger = (recording(0.01 * i) for i in (1, 2, 3))
     assert proposed({"a": small, "b": large}) is None, "too few to spare one"
-    assert proposed({"a": small, "b": large, "c": larger}).name == "c"
+    assert proposed({"a": small, "b": large, "c": larger}) == HoldOut("c", "it is the last of 3")
     again = proposed({"x/a.csv": small, "b": recording(0.01), "c": larger})
-    assert again.name == "b" and again.why == "it repeats the command of a.csv"
+    assert again == HoldOut("b", "it repeats the command of a.csv")
 
 
 @pytest.fixture

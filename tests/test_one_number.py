@@ -230,7 +230,7 @@ def test_shares_are_those_of_the_residual_as_it_is(case):
     for row, one in zip(table.rows, document["explained_by"]):
         assert row[-1] == f"{100.0 * one['r2']:.1f} %"
     for text in of_comparison_texts(found).values():
-        for share in re.findall(r"([\d.]+) % of the residual", text):
+        for share in re.findall(r"(\d[\d.]*) % of the residual", text):
             assert any(f"{100.0 * one:.0f}" == share for one in by.values())
 
 

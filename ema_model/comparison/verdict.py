@@ -74,10 +74,11 @@ def judge(
     happened = [] if adequate else events(residuals, names, recordings, actuator)
     sentences = [one.sentence for one in happened]
     if not adequate:
-        sentences += [one.sentence for one in significant[:1]]
+        where = [one.sentence for one in regions[:3]]
         if orders and significant and significant[0].variable == "motor_angle":
-            sentences.append(_order(orders[0], primary, residuals, actuator))
-        sentences += [one.sentence for one in regions[:3]]
+            where.insert(0, _order(orders[0], primary, residuals, actuator))
+        # what is missing, then the statistic that bears it out
+        sentences += [*where[:1], *(one.sentence for one in significant[:1]), *where[1:]]
     told = OverFloor(error, floor_band)
     if adequate:
         sentences.append(_explained(of_signal(primary, actuator.axes), errors[shown], told))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 
 from ema_model.actuator import Actuator
@@ -10,6 +10,7 @@ from ema_model.actuator.file import check_represents
 from ema_model.comparison.compare import weights_of
 from ema_model.comparison.loop_lag import other_controller
 from ema_model.comparison.residuals import OPEN_LOOP
+from ema_model.comparison.result import Comparison
 from ema_model.discovery.criteria import FAR
 from ema_model.discovery.history import Step, Story, rung_of
 from ema_model.discovery.observed.repeatability import by_inverse_dynamics, is_lost, with_divergence
@@ -37,11 +38,13 @@ def begun(
     holdout: Sequence[Measurement] = (),
     signals: Sequence[str] | None = None,
     tell: Progress = lambda text: None,
+    compared: Comparison | None = None,
 ) -> Story:
     """The calibrated model, before any effect.
 
     A loop that is not repeatable is taken by inverse dynamics, where the recordings allow it, and so is an open one:
     there the noise of what is put in adds up in the motion.
+    compared: of the same recordings, actuator and signals, whose calibration this one goes on from.
     Raises InputError for recordings that cannot be compared.
     """
     check_same_actuator([*measurements, *holdout])
@@ -49,7 +52,8 @@ def begun(
     compile_library(actuator)
     actuator = with_delay_of_drive(actuator, measurements)
     is_open = actuator.controller.kind == "open"
-    simulated = None if is_open else calibrated_story(measurements, actuator, holdout, signals, tell)
+    starts = None if compared is None else _where_it_ended(compared)
+    simulated = None if is_open else calibrated_story(measurements, actuator, holdout, signals, tell, starts)
     if simulated is not None and simulated.repeatable:
         return simulated
     moved = _by_motion(measurements, actuator, holdout, signals, tell)
@@ -85,19 +89,23 @@ def calibrated_story(
     holdout: Sequence[Measurement],
     signals: Sequence[str] | None,
     tell: Progress,
+    starts: Mapping[str, float] | None = None,
 ) -> Story:
-    """The same of what one model can take, in its loop or without."""
+    """The same of what one model can take, in its loop or without.
+
+    starts: x by name of an earlier calibration, near which this one ends.
+    """
     tell("measuring the model's floor")
     data, held = (_data(recordings, actuator, signals) for recordings in (measurements, holdout))
     assert data is not None
-    tell("calibrating")
+    tell("calibrating" if starts is None else "taking on the comparison's calibration")
     far = replace(data, floors=[replace(one, even=True) for one in data.floors])
-    base = fit(far, actuator, tell=tell)
+    base = fit(far, actuator, starts, tell, rough=starts is not None)
     is_far = floor_ratio(far, base.plant, base.calibration.signals) > FAR
     # How the two models differ depends on their parameters: on where the motor comes to stand above all.
     data, lost = with_divergence((far if is_far else data).beside(base), base)
     held = None if held is None else held.beside(base)
-    if not data.weighs_as(far):
+    if not (base.calibration.is_final and data.weighs_as(far)):
         base = fit(data, actuator, base.starts, tell)
     data, held = in_floors_of(base, data, held)
     story = Story(data, held, [Step(base, rung_of(Change(), base, data, held), ())], not is_lost(lost))
@@ -105,6 +113,14 @@ def calibrated_story(
         left = floor_ratio(data.before_fit, base.plant, base.calibration.signals)
         story.loop_lag = other_controller(base.plant, base.calibration, base.calibration.before, left)
     return story
+
+
+def _where_it_ended(compared: Comparison) -> Mapping[str, float] | None:
+    """x by name; None of a comparison whose calibration is not to be trusted, or that has none."""
+    found = compared.calibration
+    if found is None or not found.converged:
+        return None
+    return dict(zip([*found.parameters, *found.starts], map(float, found.x)))
 
 
 def with_fitted_effects(

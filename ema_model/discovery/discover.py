@@ -7,6 +7,7 @@ from dataclasses import replace
 
 from ema_model.actuator import Actuator, load_actuator
 from ema_model.comparison.explain import Explanation
+from ema_model.comparison.result import Comparison
 from ema_model.discovery.begin import begun
 from ema_model.discovery.history import Story, refreshed
 from ema_model.discovery.inverse import other_loop, support_of
@@ -38,14 +39,16 @@ def discover(
     signals: Sequence[str] | None = None,
     candidates: Sequence[str] | None = None,
     most_effects: int = NO_LIMIT,
+    compared: Comparison | None = None,
     on_progress: Progress | None = None,
     stop: Callable[[], bool] | None = None,
 ) -> Discovery:
     """The missing effects of recordings of one actuator, added to its model one after another.
 
     holdout: recordings that are not fitted and must improve as well; candidates: effects to consider, all of the
-    catalogue's without it.  on_progress is told what goes on, and may raise to stop.  stop() is asked as often once
-    the model is calibrated; where it is true, what was added so far is the answer, with the verdict "interrupted".
+    catalogue's without it; compared: a comparison of the same, on whose calibration this goes on.  on_progress is told
+    what goes on, and may raise to stop.  stop() is asked as often once the model is calibrated; where it is true, what
+    was added so far is the answer, with the verdict "interrupted".
     Raises InputError for recordings that cannot be compared.
     """
     if not as_number(most_effects) >= 0.0:
@@ -60,7 +63,7 @@ def discover(
         progress(text)
         go_on()
 
-    story = begun(measurements, actuator or load_actuator(), holdout, signals, progress)
+    story = begun(measurements, actuator or load_actuator(), holdout, signals, progress, compared)
     if not story.repeatable:
         return result_of(story)
     try:

@@ -34,7 +34,7 @@ from emaviz.figures import theme
 from emaviz.figures.lines import Lines, LiveLines
 from emaviz.figures.runs import LAST_MORE_PX, PLANT_LINE, charts, legend, time_axis, value_axis
 from emaviz.figures.theme import Binned, Series, binned, chart, edges_for, envelope, line, scattered, svg_number
-from emaviz.text.html import Html, add_html, html, joined, mathml
+from emaviz.text.html import Html, add_html, html, joined, mathml, unescaped
 
 # --- the error ladder: how far the model is from the recordings, step by step, in units of the floor ------------------
 
@@ -317,7 +317,7 @@ def _residual(found: Discovery) -> Quantity:
 
 Array = NDArray[np.float64]
 
-SIGNATURE = theme.MODEL
+SIGNATURE, RESIDUAL = theme.MODEL, theme.RESIDUAL
 _VARIABLES = ("motor_angle", "motor_speed", "user_position", "current", "load", "acceleration")
 _TURN = 2.0 * np.pi
 _MOST_IN_A_TURN = 8.0  # periods that are told from one another where a turn is drawn whole
@@ -454,6 +454,7 @@ def _add_left(chart: go.Figure, left: Binned, axis: Quantity, shown: Quantity) -
 # --- what an effect does to a run: live charts with and without it, and a small picture for a card --------------------
 
 _SMALL_POINTS = 160
+_TAG = re.compile(r"<[^>]+>")  # of Plotly's, in a title
 _WIDTH, _HEIGHT = 120, 44  # of a small picture, pixels
 
 
@@ -532,6 +533,56 @@ def small_picture(felt: WithEffect) -> str:
         f'<polyline points="{points}" fill="none" stroke="{DIFFERENCE}" stroke-width="1"/></svg>'
     )
     return f"data:image/svg+xml,{quote(svg)}"
+
+
+_SKETCH = 240, 84  # pixels
+_LEAST_SPAN = 1e-30
+
+
+def sketch(figure: go.Figure) -> Html:
+    """A figure's lines and points as a small SVG with the range of its axes beside them; nothing where it has none."""
+    lines: tuple[Any, ...] = tuple(figure.data)
+    traces = [
+        (trace, np.asarray(trace.x, dtype=float), np.asarray(trace.y, dtype=float))
+        for trace in lines
+        if trace.x is not None and len(trace.x)
+    ]
+    points = [(x[good], y[good]) for _, x, y in traces if (good := np.isfinite(x) & np.isfinite(y)).any()]
+    if not points:
+        return Html()
+    every_x, every_y = (np.concatenate(parts) for parts in zip(*points))
+    left, right = float(every_x.min()), float(every_x.max())
+    low, high = min(float(every_y.min()), 0.0), max(float(every_y.max()), 0.0)
+    wide, tall = _SKETCH
+
+    def across(x: Array) -> Array:
+        return wide * (x - left) / max(right - left, _LEAST_SPAN)
+
+    def down(y: Array) -> Array:
+        return 3.0 + (tall - 6.0) * (1.0 - (y - low) / max(high - low, _LEAST_SPAN))
+
+    zero = float(down(np.array([0.0]))[0])
+    drawn = [f'<line x1="0" x2="{wide}" y1="{zero:.1f}" y2="{zero:.1f}" stroke="#868e96" stroke-width=".6"/>']
+    for trace, x, y in traces:
+        good = np.isfinite(x) & np.isfinite(y)
+        at = list(zip(across(x[good]), down(y[good])))
+        if trace.mode == "markers":
+            drawn += [f'<circle cx="{a:.1f}" cy="{b:.1f}" r="2" fill="{trace.marker.color}"/>' for a, b in at]
+        else:
+            line = " ".join(f"{a:.1f},{b:.1f}" for a, b in at)
+            width = trace.line.width or 1.5
+            drawn.append(f'<polyline points="{line}" fill="none" stroke="{trace.line.color}" stroke-width="{width}"/>')
+    x_title, y_title = (_TAG.sub("", axis.title.text or "") for axis in (figure.layout.xaxis, figure.layout.yaxis))
+    svg = unescaped(f'<svg viewBox="0 0 {wide} {tall}" aria-hidden="true">{"".join(drawn)}</svg>')
+    ends = [number(one, 2) for one in (low, high, left, right)]
+    return html(
+        '<figure class="emaviz-sketch"><small>{}: {} … {}</small>{}<small>{}: {} … {}</small></figure>',
+        unescaped(y_title),
+        *ends[:2],
+        svg,
+        unescaped(x_title),
+        *ends[2:],
+    )
 
 
 # --- how an effect looks in the current's residual, against a variable and over time, as SVG --------------------------

@@ -19,6 +19,7 @@ from ema_model.members import classes_in, members
 from ema_model.simulation import plant
 from emaviz.page import compare, explore
 from emaviz.page.charts import add_chart_tools
+from emaviz.page.correction import Correction
 from emaviz.page.explore.tab import ExploreTab
 from emaviz.page.job_bar import JobBar
 from emaviz.page.measure import Measuring, add_measuring
@@ -199,6 +200,7 @@ class App:
             self._files,
             self.standings,
             self.sharing,
+            Correction(self.page, self.discovering),
         )
         for kind, panel in zip(kinds, panels):
             self.shared.tabs[kind] = kind(self.shared, panel)

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from emaviz.figures.runs import LEAST_SPACE_PX
 from emaviz.page.window_layout import LEFT_PX, TWO_COLUMNS_PX
-from emaviz.server.viser_private import Inside, id_of
+from emaviz.server.viser_private import Inside, id_of, in_single_precision
 from emaviz.text.html import Html, unescaped
 
 # --- charts over time that stand below each other, and figures, as high in each window as fills it --------------------
@@ -66,6 +66,8 @@ class ChartHeights:
 
         beside_px: what it has left besides where the parts of its tab stand in two columns.
         """
+        for one in charts:
+            in_single_precision(one)  # seven digits are more than a chart has pixels
         more = spare_px // max(len(charts), 1)
         self._stacks.append(_Stack(tuple((one, int(one.height) + more) for one in charts), beside_px))
 

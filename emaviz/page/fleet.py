@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import Any
 
 import plotly.graph_objects as go
@@ -10,14 +10,14 @@ import viser
 
 from ema_model.fleet.result import UnitsCompared, document_of, lacking, notes, rests_on, sentences
 from emaviz.figures import fleet
-from emaviz.page.panel import REPORT, FolderChoice, JobLine, KeepButtons, Keeps, PracticeButtons, Seal
+from emaviz.page.panel import REPORT, Example, FolderChoice, JobLine, KeepButtons, Keeps, PracticeButtons, Seal
 from emaviz.page.share import Place
 from emaviz.page.tab import Shared, Standing, Tab
 from emaviz.page.window_layout import COLUMNS, NEXT_COLUMN, PLOTS_EARLY
 from emaviz.page.workspaces import Page, Workspace
 from emaviz.session.fleet import TYPE, ComparingUnits
 from emaviz.session.session_file import Part
-from emaviz.text.html import BOX, DIM, Html, add_html, begin, html, joined, note
+from emaviz.text.html import BOX, DIM, Html, add_html, begin, html, joined, note, waiting
 from emaviz.text.results import MEANINGS, begun, of_units, warned, whole
 
 # --- what stays of compared units: the report, and the type as an actuator's file -------------------------------------
@@ -58,6 +58,12 @@ _WIDTH_PX = 540  # of a figure on a usual panel, by which its share of height is
 _HEAD_PX, _ROW_PX, _FEWEST_ROWS = 110, 34, 4  # of the matrix
 
 
+_EXAMPLE = "Run an example", "Six units of one type, of which two differ: made in the data folder, then compared."
+
+
+_WAITING = "One model is fitted to all units; then a parameter is let go where a unit differs."
+
+
 class UnitsResult:
     """Everything here is built and changed on the screen's thread."""
 
@@ -65,7 +71,11 @@ class UnitsResult:
         self._page, self._comparing = page, comparing
         gui = page.server.gui
         add_html(gui, COLUMNS)
-        self._told = add_html(gui, begin("No units are compared yet", _STEPS))
+        self.run_example: Callable[[], object] = lambda: None
+        self._empty = begin(
+            "No units are compared yet", _STEPS, Example(page, *_EXAMPLE, lambda: self.run_example()).html
+        )
+        self._told = add_html(gui, self._empty)
         add_html(gui, PLOTS_EARLY)
         self._matrix = gui.add_folder("The model of one unit on another", visible=False)
         with self._matrix:
@@ -82,6 +92,11 @@ class UnitsResult:
             add_html(gui, NEXT_COLUMN)
             self._parameters: Any = gui.add_plotly(go.Figure(), config=_CONFIG, aspect=1.0)
 
+    def busy(self, busy: bool) -> None:
+        """Whether a run goes on: where there is no answer yet, it is said that it does."""
+        if self._comparing.found is None:
+            self._told.content = waiting(self._comparing.job.title, _WAITING) if busy else self._empty
+
     def show(self, found: UnitsCompared | None) -> None:
         """An answer; None for none."""
         with self._page.server.atomic():
@@ -90,7 +105,7 @@ class UnitsResult:
             self._keep.clear()
             self._seal.show()
             if found is None:
-                self._told.content = begin("No units are compared yet", _STEPS)
+                self._told.content = self._empty
                 return
             self._told.content = said(found)
             self._parameters.figure = fleet.unit_parameters(found)
@@ -137,6 +152,8 @@ class UnitsPanel:
 
     def __init__(self, page: Page, comparing: ComparingUnits, result: UnitsResult, standing: Standing) -> None:
         self._page, self._comparing, self._result = page, comparing, result
+        self._example_asked = False
+        result.run_example = self._run_example
         gui, post = page.server.gui, page.screen.post
         add_html(gui, note(_ABOUT))
         hint = "Folders of the data folder that hold units"
@@ -172,6 +189,14 @@ class UnitsPanel:
     def choose(self, name: str) -> None:
         """A folder by its name; on the screen's thread."""
         self._folder.choose(name)
+        if self._example_asked:
+            self._example_asked = False
+            self._begin()
+
+    def _run_example(self) -> None:
+        """The first challenge: its recordings are made, then compared."""
+        practice = self._comparing.practice
+        self._example_asked = self._page.begins(lambda: practice.open(practice.shipped[0]), self._start)
 
     def show(self) -> None:
         """What is chosen and its answer, as a session's file says."""
@@ -219,6 +244,7 @@ class UnitsPanel:
             self._line.say("")
 
     def _busy(self, busy: bool) -> None:
+        self._result.busy(busy)
         if busy:
             self._practice.fold()
         with self._page.server.atomic():

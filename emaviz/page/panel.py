@@ -10,10 +10,10 @@ from typing import Any, Protocol
 import viser
 
 from ema_model.text import InWords
-from emaviz.page.style import IN_ROW
+from emaviz.page.style import IN_ROW, unseen
 from emaviz.page.workspaces import Page, Workspace
 from emaviz.recording.viewer import ViewerHost
-from emaviz.server.viser_private import Inside
+from emaviz.server.viser_private import Inside, id_of
 from emaviz.session.data_folder import DataFolder
 from emaviz.session.files import Practice
 from emaviz.session.inputs import Provenance, ResultFiles
@@ -207,6 +207,33 @@ class FolderChoice:
             self._take_name(name)
 
 
+# --- something that is shipped, which an empty screen runs at one click -----------------------------------------------
+
+_EXAMPLE = (
+    "font:inherit;font-weight:600;color:#fff;background:var(--mantine-primary-color-filled,#2f6fde);border:0;"
+    "border-radius:4px;padding:5px 14px;cursor:pointer"
+)
+
+
+class Example:
+    """Its button stands in what `begin` says of an empty screen."""
+
+    def __init__(self, page: Page, title: str, about: str, run: Callable[[], object]) -> None:
+        """run(): on the screen's thread; what it refuses is told to all."""
+        pressed: Any = page.server.gui.add_button(title, color="gray")
+        add_html(page.server.gui, unseen([id_of(pressed)]))
+        pressed.on_click(lambda _: page.ask(f"example {title}", run))
+        self.html = html(
+            '<div style="padding-top:12px;display:flex;gap:12px;align-items:center">'
+            '<button style="{};white-space:nowrap" onclick="window.emavizPress(\'{}\')">▶ {}</button>'
+            '<span style="opacity:.75;font-size:13px;line-height:1.35">{}</span></div>',
+            _EXAMPLE,
+            id_of(pressed),
+            title,
+            about,
+        )
+
+
 # --- buttons that take what is shown to the workspace where one goes on with it ---------------------------------------
 
 
@@ -219,6 +246,8 @@ class Lead:
     hint: str
     to: str  # the workspace's name
     take: Callable[[], Any]
+    begins: Callable[[], bool] | None = None  # what begins there at once, as of `Page.begins`
+    colour: Any = None
 
 
 class Leads:
@@ -226,20 +255,22 @@ class Leads:
 
     def __init__(self, page: Page, leads: Sequence[Lead]) -> None:
         self._page = page
-        for one in leads:
-            self._add(one)
+        self.buttons = [self._add(one) for one in leads]
 
-    def _add(self, lead: Lead) -> None:
-        button = self._page.server.gui.add_button(lead.label, icon=lead.icon, hint=lead.hint)
+    def _add(self, lead: Lead) -> Any:
+        button: Any = self._page.server.gui.add_button(lead.label, icon=lead.icon, hint=lead.hint, color=lead.colour)
 
         def follow(event: viser.GuiEvent[Any]) -> None:
             def taken() -> None:
                 if self._page.checked(lead.take, button):
                     self._page.workspaces.go(lead.to, event.client)
+                    if lead.begins is not None:
+                        self._page.begins(lead.begins, button)
 
             self._page.screen.post(f"lead {lead.label}", taken)
 
         button.on_click(follow)
+        return button
 
 
 # --- buttons that keep what is shown in the data folder, and what they have written -----------------------------------

@@ -21,7 +21,7 @@ from emaviz.figures.identification import named
 from emaviz.figures.lines import Lines, Window, clipped
 from emaviz.page.campaigns import CampaignControls
 from emaviz.page.measure import marked
-from emaviz.page.panel import recording_link
+from emaviz.page.panel import Example, recording_link
 from emaviz.page.share import Place, share_line
 from emaviz.page.tab import Shared, Tab
 from emaviz.page.window_layout import COLUMNS
@@ -38,6 +38,7 @@ from emaviz.session.jobs import Worker
 from emaviz.session.recorded_runs import RecordedRuns
 from emaviz.session.session_file import Part
 from emaviz.text.html import Html, add_html, begin, boxed, html, joined, said
+from emaviz.text.terms import explained
 
 # --- everything on the page as one file: saved to the data folder and to the browser, loaded from either --------------
 
@@ -139,7 +140,7 @@ _STEPS = (
     "Choose the run on the left: you see what it found, and its current.",
     "Open it in Rerun, on this page or in a tab of its own, or lay two runs over each other.",
 )
-_NOTHING = begin("Nothing is recorded yet", _STEPS)
+_EXAMPLE = "Run an example", "Faults on Explore's sliders are identified; the search is recorded, and stands here then."
 
 
 class RunsResult:
@@ -151,12 +152,15 @@ class RunsResult:
         self._window: Window | None = None  # of time, in which the pair is shown
         self._shown: Recording | None = None  # the chosen run
         self._plot: Any = None
-        self._told, self._drawn = _NOTHING, False  # of the chosen run
+        self.run_example: Callable[[], object] = lambda: None  # records something
+        self._drawn = False  # of the chosen run
         self._opened, self._dark = ("", ""), False  # the viewer's address and recording; whether the page is dark
         self._tab = panel.add_tab("Rerun", viser.Icon.PLAYER_PLAY)
         gui = page.server.gui
         with self._tab:
-            self._frame = add_html(gui, _NOTHING)
+            example = Example(page, *_EXAMPLE, lambda: self.run_example())
+            self._told = self._nothing = begin("Nothing is recorded yet", _STEPS, example.html)
+            self._frame = add_html(gui, self._nothing)
             self._glance: Any = gui.add_plotly(go.Figure(), config=_CONFIG, aspect=0.5, visible=False)
             self._close = gui.add_button("Close the viewer", icon=viser.Icon.X, color="gray", visible=False)
         with panel.add_tab("Two runs", viser.Icon.ARROWS_DIFF):
@@ -194,7 +198,7 @@ class RunsResult:
     def show(self, told: Html, recording: Recording | None) -> None:
         """The chosen run, where the viewer is not open: what is said of it, and its current; None for none."""
         self._shown = recording
-        self._told, self._drawn = told or _NOTHING, self._draw_glance(None)
+        self._told, self._drawn = told or self._nothing, self._draw_glance(None)
         if not self._close.visible:
             self._frame.content, self._glance.visible = self._told, self._drawn
 
@@ -486,7 +490,7 @@ def _card(entry: Entry) -> Html:
         html(
             "<div>{} {}{}</div>",
             named(name),
-            _result(answer, entry.found.values()),
+            explained(_result(answer, entry.found.values())),
             " ★" if name == entry.best and len(entry.found) > 1 else "",
         )
         for name, answer in entry.found.items()
@@ -532,7 +536,7 @@ def _listed(entries: list[Entry]) -> Html:
                 '<div style="padding:2px 0;overflow-wrap:anywhere">{}<div style="opacity:.75;font-size:11.5px">{}</div>'
                 "</div>",
                 entry.name,
-                says,
+                explained(says),
             )
         )
     return html("<div {}>{}</div>", _BOX, joined(rows))

@@ -71,6 +71,12 @@ def page() -> Html:
         f"div:has(> div > .emaviz-pairs) {_LABEL}{{width:5.6em!important}}"
         f"div:has(> div > .emaviz-pairs) > div:has(input[type=checkbox]) > .mantine-Flex-root > div:first-child"
         "{width:8.4em!important}"
+        # a term that the pointer explains
+        "abbr[title]{text-decoration:underline dotted rgba(134,142,150,.9);text-underline-offset:2px;cursor:help}"
+        # where a result will stand, while it is computed
+        ".emaviz-waits{height:96px;border-radius:6px;margin:0 10px 7px;background:linear-gradient(90deg,"
+        "rgba(134,142,150,.1),rgba(134,142,150,.28),rgba(134,142,150,.1));background-size:200% 100%;"
+        "animation:emaviz-waits 1.4s linear infinite}@keyframes emaviz-waits{to{background-position:-200% 0}}"
         # a result's links, in the line of the tabs above it
         ".emaviz-share{display:flex;gap:16px;justify-content:flex-end;padding:2px 12px;font-size:12.5px;"
         "line-height:20px}.emaviz-report{padding:6px 12px 0;font-size:14px}"

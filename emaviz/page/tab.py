@@ -12,6 +12,7 @@ from typing import Any, ClassVar, TypeVar, cast
 import viser
 
 from ema_model.text import COLOURS
+from emaviz.page.correction import Correction
 from emaviz.page.panel import RECORD
 from emaviz.page.playback import PlaybackStrip
 from emaviz.page.share import VIEW, Place, Sharing, share_line
@@ -167,6 +168,7 @@ class Shared:
     files: Worker  # reads and packs files
     standings: Standings  # of the tabs' results
     sharing: Sharing  # addresses of what tabs show
+    correction: Correction  # the steps from a file to an improved model
     tabs: dict[type[Tab], Tab] = field(default_factory=dict)
 
     def tab(self, kind: type[AnyTab]) -> AnyTab:

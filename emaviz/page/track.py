@@ -26,6 +26,7 @@ from emaviz.page.panel import (
     RECORD,
     REPORT,
     Cleared,
+    Example,
     FolderChoice,
     JobLine,
     KeepButtons,
@@ -45,7 +46,7 @@ from emaviz.session.compare import Comparing
 from emaviz.session.jobs import Worker
 from emaviz.session.session_file import Part
 from emaviz.session.track import Following
-from emaviz.text.html import BOX, DIM, Html, add_html, begin, boxed, html, joined, note
+from emaviz.text.html import BOX, DIM, Html, add_html, begin, boxed, html, joined, note, waiting
 from emaviz.text.results import warned, whole
 
 # --- a click on a flight in its chart ---------------------------------------------------------------------------------
@@ -154,6 +155,12 @@ _ASPECTS = (0.66, 0.42, 0.48)  # of the figures, height over width: the first st
 _SO_FAR_ASPECT = 0.45  # of the figure of flights that are too few to follow
 
 
+_EXAMPLE = "Run an example", "A life of sixty flights: made in the data folder, then tracked, which takes some minutes."
+
+
+_TITLE, _WAITING = "Identifying the flights", "The first are drawn as soon as they are identified."
+
+
 class TrackResult:
     """Drawn on the slow screen's thread while "today" is dragged, else on the screen's."""
 
@@ -170,7 +177,11 @@ class TrackResult:
         self._history: History | None = None
         gui = page.server.gui
         self._by_hand = False  # whether somebody has chosen the k that is shown
-        self._told = add_html(gui, begin("No flights are tracked yet", _STEPS))
+        self.run_example: Callable[[], object] = lambda: None
+        self._empty = begin(
+            "No flights are tracked yet", _STEPS, Example(page, *_EXAMPLE, lambda: self.run_example()).html
+        )
+        self._told = add_html(gui, self._empty)
         self._so_far = gui.add_plotly(go.Figure(), config=_CONFIG, aspect=_SO_FAR_ASPECT, visible=False)
         self._life = gui.add_folder("The unit's life", visible=False)
         with self._life:
@@ -196,6 +207,11 @@ class TrackResult:
         self._today.on_update(lambda event: event.client and slow.post("today", self._draw))
         self._fault.on_update(lambda event: event.client and self._choose())
 
+    def busy(self, busy: bool) -> None:
+        """Whether a run goes on: where no flight is shown yet, it is said that it does."""
+        if self._told.content in (self._empty, waiting(_TITLE, _WAITING)):
+            self._told.content = waiting(_TITLE, _WAITING) if busy else self._empty
+
     def show_first(self, flights: Sequence[Flight], count: int) -> None:
         """The first flights, before there are enough to follow; count: in all."""
         self.show(None)
@@ -217,7 +233,7 @@ class TrackResult:
         if begun:
             self._seal.show()
         if history is None or last is None:
-            self._told.content = begin("No flights are tracked yet", _STEPS)
+            self._told.content = self._empty
             return
         at_end = begun or self._today.value >= self._today.max
         first, end = min(history.looks), max(history.looks)
@@ -337,6 +353,8 @@ class TrackPanel:
 
     def __init__(self, page: Page, following: Following, result: TrackResult, standing: Standing) -> None:
         self._page, self._following, self._result = page, following, result
+        self._example_asked = False
+        result.run_example = self._run_example
         gui, post = page.server.gui, page.screen.post
         add_html(gui, note(_ABOUT))
         hint = "Folders of the data folder that hold recordings"
@@ -380,6 +398,14 @@ class TrackPanel:
     def choose(self, name: str) -> None:
         """A folder by its name; on the screen's thread."""
         self._folder.choose(name)
+        if self._example_asked:
+            self._example_asked = False
+            self._begin()
+
+    def _run_example(self) -> None:
+        """The first challenge: its recordings are made, then tracked."""
+        practice = self._following.practice
+        self._example_asked = self._page.begins(lambda: practice.open(practice.shipped[0]), self._start)
 
     def show(self) -> None:
         """What is chosen, as a session's file says; its flights are shown once they are followed."""
@@ -463,6 +489,7 @@ class TrackPanel:
             self._line.say("")
 
     def _busy(self, busy: bool) -> None:
+        self._result.busy(busy)
         if busy:
             self._practice.fold()
         with self._page.server.atomic():

@@ -7,6 +7,8 @@ from collections.abc import Callable
 from functools import cache
 from typing import Any
 
+import numpy as np
+import numpy.typing as npt
 import viser
 from viser import _gui_api, _gui_handles, _icons, _messages
 from viser._messages import FileTransferPart as TransferPart
@@ -22,6 +24,12 @@ def id_of(control: Any) -> str:
 def selector_of(control: Any) -> str:
     """What a style rule calls it."""
     return f'[id="{id_of(control)}"]'
+
+
+def in_single_precision(chart: Any) -> Any:
+    """A live chart whose numbers are sent in four bytes each: viser casts what is assigned by its declared types."""
+    chart.__dict__["_prop_hints"] = {**chart._prop_hints, "data": tuple[npt.NDArray[np.float32], ...]}
+    return chart
 
 
 def keep_icons() -> None:

@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+import re
 import threading
 import time
-from collections.abc import Callable, Hashable
+from collections.abc import Callable, Collection, Hashable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
-from ema_model.actuator import Actuator
+import numpy as np
+
+from ema_model.actuator import Actuator, load_actuator
+from ema_model.challenges import challenges
 from ema_model.comparison.result import Comparison
 from ema_model.errors import InputError, quoted
 from ema_model.files.opened import refusal, shown
@@ -38,6 +42,7 @@ class CompareEvents:
     refused: Signal[[]] = field(default_factory=Signal)  # a layout that does not fit: all is as it was
     failed: Signal[[str, str, str]] = field(default_factory=Signal)  # which of those above, name, why; "": done
     removed: Signal[[]] = field(default_factory=Signal)
+    held: Signal[[]] = field(default_factory=Signal)  # other recordings are held out, or proposed to be
     missing: Signal[[str, bool]] = field(default_factory=Signal)  # for a comparison, "": it began; asked for by hand
     compared: Signal[[Comparison]] = field(default_factory=Signal)
     kept: Signal[[Path]] = field(default_factory=Signal)  # a report or a recording is written
@@ -170,6 +175,46 @@ class FileJobs:
         self._failed(what, name, "")
 
 
+# --- recordings that are not fitted, by which a model is judged: which say so themselves, and which suggests itself ---
+
+_SAYS_SO = re.compile(r"(?<![a-z])(unseen|hold[ _-]?out|held([ _-]?out)?|test|validation)(?![a-z])")
+_SEVERAL = 3  # recordings, of which one can be spared
+_ALIKE = 1e-3  # of a command's span, that a repeated one may differ by
+
+
+@dataclass(frozen=True)
+class HoldOut:
+    """A recording that suggests itself."""
+
+    name: str
+    why: str  # 'it repeats the command of sine.csv'
+
+
+def called_held_out(names: Sequence[str]) -> list[str]:
+    """Those whose own names say that they are not to be fitted; none where all of them do."""
+    found = [name for name in names if _SAYS_SO.search(Path(name).stem.lower())]
+    return found if len(found) < len(names) else []
+
+
+def proposed(measurements: Mapping[str, Measurement]) -> HoldOut | None:
+    """Of several by their names: the last one that repeats another's command, else the last; None of few."""
+    if len(measurements) < _SEVERAL:
+        return None
+    names = list(measurements)
+    for at in range(len(names) - 1, 0, -1):
+        for other in names[:at]:
+            if _same_command(measurements[names[at]], measurements[other]):
+                return HoldOut(names[at], f"it repeats the command of {Path(other).name}")
+    return HoldOut(names[-1], f"it is the last of {len(names)}")
+
+
+def _same_command(one: Measurement, other: Measurement) -> bool:
+    if "command_rad" not in one or "command_rad" not in other or one.samples != other.samples:
+        return False
+    own, its = one["command_rad"], other["command_rad"]
+    return bool(np.max(np.abs(own - its)) <= _ALIKE * np.ptp(own))
+
+
 # --- what stays of a comparison in the data folder: the report, and the recording for Rerun ---------------------------
 
 
@@ -191,6 +236,7 @@ def keep(comparison: Comparison, folder: DataFolder, suffix: str) -> Path:
 # --- the session's part of Compare: files in, their mapping, and comparisons on the compute thread --------------------
 
 MOST_RECORDINGS = 20
+EXAMPLE = "after_the_overhaul"  # a challenge
 # By their names on a rotary axis.  The speed is mostly the position's difference, so it is not fitted unless asked for.
 COMPARABLE = ("current_A", "motor_position_rad", "user_position_rad", "motor_speed_rad_s")
 USUAL = {name: 1.0 for name in COMPARABLE[:3]}
@@ -212,6 +258,8 @@ class Comparing:
         self.free: set[str] = set()
         self.weights: dict[str, float] = dict(USUAL)  # of the signals to fit
         self.window_s: tuple[float, float] | None = None
+        self.held_out: set[str] = set()  # recordings that are not fitted, by name
+        self._decided: set[str] = set()  # those of which somebody has said it
         advice = "check the actuator's file and the measurement's units"
         self.job = Job(session.worker, on_divergence=advice)
         self._files = FileJobs(folder, self.events.failed, session.events.told)
@@ -245,6 +293,15 @@ class Comparing:
         """Opens a file of the data folder soon; what is wrong with it is told."""
         self._read(OPEN, name, lambda: self._open(name))
 
+    def open_example(self) -> None:
+        """Opens the recordings of a shipped challenge, with its actuator; what it holds out is held out."""
+        example = next(one for one in challenges() if one.name == EXAMPLE)
+        actuator = load_actuator(example.actuator).name
+        if self.actuator.name != actuator:
+            self.choose_actuator(actuator)
+        for file in (*example.training, *example.holdout):
+            self.add(self.folder.name_of(self.folder.take_in(file)))
+
     def measurement(self, name: str, actuator: Actuator | None = None) -> Measurement:
         """A file of the data folder for an actuator, the app's without one; as Compare has it, if it is open here."""
         actuator, opened = actuator or self.session.actuator, self.opened.get(name)
@@ -259,6 +316,8 @@ class Comparing:
     def remove(self, name: str) -> None:
         """Takes a recording off the list; its file stays."""
         self.opened.pop(name, None)
+        self.held_out.discard(name)
+        self._decided.discard(name)
         self.events.removed()
 
     def version(self, name: str) -> str:
@@ -328,6 +387,8 @@ class Comparing:
 
     def _opened(self, opened: Opened) -> None:
         self.opened[opened.name] = opened
+        if self._decided.isdisjoint(self.opened):  # what says by its name that it is not to be fitted is not
+            self.held_out = set(called_held_out(list(self.opened)))
         self.asking.has_read(opened.name)
         self.events.opened(opened)
 
@@ -392,6 +453,26 @@ class Comparing:
             raise InputError(f"the window must start before it ends: from {first:g} s to {last:g} s is none")
         self.window_s = (first, last)
 
+    def hold_out(self, name: str, held: bool) -> None:
+        """Whether a recording is kept from the fit, to judge by."""
+        self._decided.add(name)
+        self.held_out = self.held_out | {name} if held else self.held_out - {name}
+        self.events.held()
+
+    def take_held_out(self, names: Collection[str], of: Collection[str] = ()) -> None:
+        """These and no others, as somebody has said before; of: recordings that are still to be opened."""
+        self.held_out = set(names)
+        self._decided = {*names, *of, *self.opened}
+        self.events.held()
+
+    @property
+    def proposal(self) -> HoldOut | None:
+        """What suggests itself to be held out, while nothing is and nobody has said otherwise."""
+        known = {name: one.measurement for name, one in self.opened.items() if one.measurement is not None}
+        if self._decided or self.held_out or len(known) < len(self.opened):
+            return None
+        return proposed(known)
+
     def signals_available(self) -> list[str]:
         """Those of `COMPARABLE` that every recording has, or can be given."""
         measurements = [o.measurement for o in list(self.opened.values()) if o.measurement is not None]
@@ -402,7 +483,7 @@ class Comparing:
     def inputs(self, as_read: bool = False) -> Inputs:
         """What a comparison takes; as_read: of the files as they were read, else as they are on the disk."""
         opened = list(self.opened.values())
-        names = [one.name.rpartition("/")[2] for one in opened]
+        names = [one.name.rpartition("/")[2] for one in opened if one.name not in self.held_out]
         return Inputs(
             listed(names),
             files={one.name: one.version_on("" if as_read else version_of(one.path)) for one in opened},
@@ -410,6 +491,7 @@ class Comparing:
                 "the actuator": f"{self.actuator_name} {digest(self.actuator)}",
                 "the calibration": listed(sorted(self.free)) if self.calibrate else "off",
                 "the window of time": str(self.window_s or ""),
+                "what is held out": listed([name for name in self.opened if name in self.held_out]),
                 **{
                     f"the weight of the {in_sentence(SIGNALS[name].title)}": str(weight)
                     for name, weight in self.weights.items()
@@ -437,6 +519,11 @@ class Comparing:
             raise InputError("calibration is on, but no parameter may move; free one, or turn it off")
         if self.window_s is not None:
             measurements = [m.selected(self.window_s) for m in measurements]
+        by_name = dict(zip(self.opened, measurements))
+        held = [one for name, one in by_name.items() if name in self.held_out]
+        fitted = [one for name, one in by_name.items() if name not in self.held_out]
+        if not fitted:
+            raise InputError("all measurements are held out; leave one to be fitted")
         asked, of, elapsed_s = self._asked(), self.inputs(as_read=True), 0.0
 
         def work(tell: Tell) -> None:
@@ -444,7 +531,7 @@ class Comparing:
 
             nonlocal elapsed_s
             began = time.perf_counter()
-            self.comparison = compare(measurements, **asked, on_progress=tell)
+            self.comparison = compare(fitted, **asked, holdout=held, on_progress=tell)
             self.provenance.take(of)
             elapsed_s = time.perf_counter() - began
 
@@ -458,6 +545,12 @@ class Comparing:
         return self.provenance.begin(lambda: self.job.begin(self._title, work, done), of)
 
     @property
+    def finished(self) -> Comparison | None:
+        """The last comparison, if it is of what is chosen now."""
+        of = self.provenance.of
+        return self.comparison if of is not None and not of.changed(self.inputs()) else None
+
+    @property
     def _title(self) -> str:
         return "Calibrating and comparing" if self.calibrate else "Comparing"
 
@@ -465,7 +558,7 @@ class Comparing:
         """What a comparison would take now."""
         weights = frozenset(self.weights.items())
         asked = self.calibrate, frozenset(self.free), weights, self.window_s
-        return tuple(self.opened.values()), id(self.actuator), *asked
+        return tuple(self.opened.values()), frozenset(self.held_out), id(self.actuator), *asked
 
     def _asked(self) -> dict[str, Any]:
         """What `compare` is asked beside the recordings; None stands for what the actuator's file says."""

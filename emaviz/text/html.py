@@ -205,17 +205,27 @@ _CARD = (
 )
 
 
-def begin(title: str, steps: Sequence[str]) -> Html:
-    """Where there is no result yet: what to do, and what comes of it."""
+def begin(title: str, steps: Sequence[str], example: Html | None = None) -> Html:
+    """Where there is no result yet: what to do, and what comes of it; example: a button that shows it."""
     rows = joined(html('<li style="padding:3px 0">{}</li>', step) for step in steps)
     return html(
         '<div class="emaviz-all-columns" style="{}">'
         '<div style="font-size:17px;font-weight:600;padding-bottom:6px">{}</div>'
-        '<ol style="margin:0;padding-left:20px">{}</ol></div>',
+        '<ol style="margin:0;padding-left:20px">{}</ol>{}</div>',
         _CARD,
         title,
         rows,
+        example or Html(),
     )
+
+
+WAITS = joined([Html('<div class="emaviz-waits"></div>')] * 3)  # where parts of a result will stand
+
+
+def waiting(title: str, about: str) -> Html:
+    """Where a result will be, while it is computed: what goes on, and a picture that moves."""
+    head = html('<div style="font-size:16px;font-weight:600;padding:4px 0">{} …</div>', title)
+    return html('<div class="emaviz-all-columns"><div {}>{}{}</div>{}</div>', BOX, head, about, WAITS)
 
 
 def boxed(content: str) -> Html:

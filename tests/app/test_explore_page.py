@@ -55,7 +55,7 @@ def test_presets_are_the_thesis_cases():
     assert np.array_equal(PRESETS["healthy"], HEALTHY) and len(PRESETS) == 12
     changed = {name: np.flatnonzero(k != HEALTHY).tolist() for name, k in PRESETS.items()}
     assert changed["friction, low"] == [0] and changed["proportional gain, high"] == [7]
-    assert changed["eccentricity, high"] == [5] and len(changed["several faults (thesis, T 5.3)"]) == 5
+    assert changed["eccentricity, high"] == [5] and len(changed["several faults, as in the thesis"]) == 5
     for name, k in PRESETS.items():
         assert name_of(k) == name and np.all((0.0 <= k) & (k <= 1.0))
     assert name_of(np.full(8, 0.123)) == CUSTOM

@@ -138,7 +138,7 @@ def table(page):
 def test_a_run_is_measured_zoomed_and_looked_into(page, app, tmp_path):
     app.session.settings.set("command", "step")
     app.session.refresh()
-    wait_until(lambda: app.session.simulation.command == "step" and page.evaluate(LIVE)[6] > 700)
+    wait_until(lambda: app.session.simulation.command == "step" and page.evaluate(LIVE)[6] > 0.8 * lines.POINTS)
     run = app.session.simulation.reference
     shows(page, LIVE, (run.time_s[0], run.time_s[-1]), 0.02)  # and not the run before it
     start, end = page.evaluate(LIVE)[4:6]
@@ -162,7 +162,7 @@ def test_a_run_is_measured_zoomed_and_looked_into(page, app, tmp_path):
     quarter = a + 0.25 * (b - a), a + 0.5 * (b - a)
     shows(page, LIVE, quarter, 0.003)
     inside = np.count_nonzero((run.time_s >= quarter[0]) & (run.time_s <= quarter[1]))
-    assert page.evaluate(LIVE)[6] == pytest.approx(min(inside, 800), rel=0.1), "in full resolution"
+    assert page.evaluate(LIVE)[6] == pytest.approx(min(inside, lines.POINTS), rel=0.1), "in full resolution"
     page.mouse.wheel(0, 120)
     wait_until(lambda: np.diff(page.evaluate(LIVE)[4:6])[0] > 1.2 * (quarter[1] - quarter[0]), 20.0)
     left, top, width, height, *_ = page.evaluate(LIVE)

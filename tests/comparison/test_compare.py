@@ -63,7 +63,8 @@ def test_cogging_is_named_with_its_order_and_amplitude(cogged):
     assert cogged.orders[0].order == 12
     # 12 mN·m of torque, of which the loop lets a part through as motion, in amperes at 0.0752 N·m/A
     assert cogged.orders[0].amplitude == pytest.approx(0.012 / 0.0752, rel=0.5)
-    assert "12 times a turn" in cogged.sentences[1] and "mN·m" in cogged.sentences[1]
+    assert "12 times a turn" in cogged.sentences[0] and "mN·m" in cogged.sentences[0]
+    assert "explained by motor angle" in cogged.sentences[1], "what is missing first, then what bears it out"
 
 
 def test_error_falls_to_the_floor_once_the_effect_is_in_the_model(cogged):

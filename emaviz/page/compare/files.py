@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Collection, Iterable
 from dataclasses import replace
 from typing import Any
 
@@ -23,12 +23,13 @@ from emaviz.text.html import Html, add_html, html, joined, unescaped
 # Short pieces of HTML on the Compare tab: the list of recordings, the data health card.
 
 _MARKS = {"good": ("✓", COLOURS["good"]), "note": ("●", COLOURS["note"]), "warning": ("▲", COLOURS["warning"])}
+_SAYS = {"good": "in order", "note": "something to know of the data", "warning": "look at the data's health"}
 _CARDS_BOX = Html('style="padding:0 10px 6px;font-size:12.5px;line-height:1.4"')
 _DIM = Html('style="opacity:.65"')
 
 
-def recordings_list(opened: Iterable[Opened]) -> Html:
-    """A line for each recording: what it is and how its data are."""
+def recordings_list(opened: Iterable[Opened], held_out: Collection[str] = ()) -> Html:
+    """A line for each recording: what it is and how its data are; held_out: names of those that are not fitted."""
     rows = []
     for one in opened:
         if one.measurement is None or one.health is None:
@@ -38,6 +39,7 @@ def recordings_list(opened: Iterable[Opened]) -> Html:
             mark = _mark(one.health.severity)
             length = f"{m.samples:,} samples".replace(",", " ")
             text = f"{length}, a static map" if m.is_map else f"{m.duration_s:.3g} s, {length}"
+            text += ", held out" if one.name in held_out else ""
         rows.append(html("<div>{} <b>{}</b> <span {}>{}</span></div>", mark, one.path.name, _DIM, text))
     return html("<div {}>{}</div>", _CARDS_BOX, joined(rows) or html("<span {}>None yet.</span>", _DIM))
 
@@ -65,7 +67,7 @@ def _finding(finding: Finding) -> Html:
 
 def _mark(severity: str) -> Html:
     sign, colour = _MARKS[severity]
-    return html('<span style="color:{}" title="{}">{}</span>', colour, severity, sign)
+    return html('<span style="color:{}" title="{}">{}</span>', colour, _SAYS[severity], sign)
 
 
 # --- the first lines of a text as they stand in the file --------------------------------------------------------------

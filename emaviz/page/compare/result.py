@@ -27,16 +27,17 @@ from emaviz.figures.theme import why_missing
 from emaviz.page.compare import WORKSPACE
 from emaviz.page.compare.columns import MappingStep
 from emaviz.page.measure import hint, marked
-from emaviz.page.panel import Cleared
+from emaviz.page.panel import Cleared, Example
 from emaviz.page.playback import PlaybackStrip
 from emaviz.page.style import IN_PAIRS
-from emaviz.page.window_layout import ALL_COLUMNS, COLUMNS, NEXT_COLUMN, PLOTS_EARLY, ROOM
+from emaviz.page.window_layout import ALL_COLUMNS, NEXT_COLUMN, PLOTS_EARLY, ROOM
 from emaviz.page.workspaces import Page
 from emaviz.scene.playback import Motion, motion
 from emaviz.server.viser_private import selector_of
 from emaviz.session.files import Opened
 from emaviz.text.html import Html, add_html, begin, html, joined, note, unescaped
 from emaviz.text.results import folded, large, of_comparison, shown, warned
+from emaviz.text.terms import explained
 
 # --- a compared recording on the 3D actuator: as measured, the screw glowing where the model fails --------------------
 
@@ -297,12 +298,14 @@ _STEPS = (
 )
 
 
+_EXAMPLE = "Run an example", "Four recordings of a rig after its overhaul, one of them held out; some seconds."
+
+
 class ResultPanel:
     """Everything here is built and changed on the screen's thread.
 
     strip: its clock, for Compare's recording on the 3D actuator; step(preview): adds what a file's columns are, above
-    the preview; leads(): adds what may follow, below the plots, where it is seen however much is answered; keep(): adds
-    what saves a comparison, below it.
+    the preview; leads(): adds what may follow, below the answer; keep(): adds what saves a comparison, below the plots.
     """
 
     def __init__(
@@ -312,7 +315,9 @@ class ResultPanel:
         step: Callable[[Callable[[Opened, str], None]], MappingStep],
         leads: Callable[[], object],
         keep: Callable[[], Cleared],
+        example: Callable[[], object],
     ) -> None:
+        """example(): opens what is shipped to try it on."""
         self._page, self._strip = page, strip
         self._drawn_at = 0.0
         self._comparison: Comparison | None = None
@@ -322,10 +327,13 @@ class ResultPanel:
         self._mapped: list[Lines] = []  # what the preview draws
         self._buttons: list[Any] = []
         gui = page.server.gui
-        add_html(gui, COLUMNS)
-        self._headline = add_html(gui, begin("Nothing is compared yet", _STEPS))
+        self._empty = begin("Nothing is compared yet", _STEPS, Example(page, *_EXAMPLE, example).html)
+        self._headline = add_html(gui, self._empty)
         add_html(gui, PLOTS_EARLY)
-        self._numbers = add_html(gui, visible=False)
+        self._next = gui.add_folder("Next", visible=False)
+        with self._next:
+            add_html(gui, IN_PAIRS)
+            leads()
         self._place = gui.add_folder("The file's columns", visible=False)
         with self._place:
             add_html(gui, ALL_COLUMNS)
@@ -336,6 +344,7 @@ class ResultPanel:
         with self._answer:
             self._hint = add_html(gui)
             self._style = add_html(gui)
+        self._numbers = add_html(gui, visible=False)  # after the sentences
         self._evidence = gui.add_folder("What the residual depends on", visible=False)
         self._plots_folder = gui.add_folder("Plots", visible=False)
         with self._plots_folder:
@@ -345,10 +354,6 @@ class ResultPanel:
         with self._evidence:  # below the sentences that it shows, where that would stay empty
             add_html(gui, ROOM)
             self._plots.add_against()
-        self._next = gui.add_folder("Next", visible=False)
-        with self._next:
-            add_html(gui, IN_PAIRS)
-            leads()
         self._save = gui.add_folder("Keep it", visible=False)
         with self._save:
             self._kept = keep()
@@ -400,7 +405,7 @@ class ResultPanel:
         """Nothing is compared any more."""
         self._comparison = self._region = None
         self._place.visible = False
-        self._headline.content = begin("Nothing is compared yet", _STEPS)
+        self._headline.content = self._empty
         self._show_answer(False)
         self._strip.put(None, WORKSPACE.name)
 
@@ -526,21 +531,23 @@ def headline(comparison: Comparison) -> Html:
     """The sentences."""
     first, *others = comparison.sentences or ("",)
     regions = {region.sentence for region in comparison.worst_regions}  # which stand in their own list
+    told = [html("<div>{}</div>", text) for text in [*others, of_floor(comparison)] if text not in regions]
     return html(
-        "<div {}>{}{}{}</div>",
+        "<div {}>{}{}</div>",
         _BOX,
         large(first, of_comparison(comparison)),
-        joined(html("<div>{}</div>", text) for text in [*others, of_floor(comparison)] if text not in regions),
-        warned(comparison.warnings),
+        explained(joined([*told, warned(comparison.warnings)])),
     )
 
 
 def numbers(comparison: Comparison) -> Html:
     """For each signal, error against floor."""
-    return html(
-        "<div {}>{}{}{}</div>",
-        _BOX,
-        shown(errors(comparison)),
-        html('<div style="opacity:.8;font-size:12.5px">{}</div>', FLOOR_NOTE),
-        folded("Each measurement", errors_by_recording(comparison, comparison.primary)),
+    return explained(
+        html(
+            "<div {}>{}{}{}</div>",
+            _BOX,
+            shown(errors(comparison)),
+            html('<div style="opacity:.8;font-size:12.5px">{}</div>', FLOOR_NOTE),
+            folded("Each measurement", errors_by_recording(comparison, comparison.primary)),
+        )
     )

@@ -22,20 +22,23 @@ from emaviz.page.compare import WORKSPACE
 from emaviz.page.compare.columns import MappingStep
 from emaviz.page.compare.files import health_card, recordings_list
 from emaviz.page.compare.result import ResultPanel
+from emaviz.page.correction import COLUMNS, FIT, MISSING
 from emaviz.page.panel import RECORD, REPORT, JobLine, KeepButtons, Lead, Leads
 from emaviz.page.share import Place
-from emaviz.page.style import LONG_LABELS
+from emaviz.page.style import LONG_LABELS, unseen
 from emaviz.page.tab import Shared, Standing, Tab
+from emaviz.page.window_layout import COLUMNS as WINDOW_COLUMNS
 from emaviz.page.workspaces import Page
 from emaviz.recording.viewer import ViewerHost
 from emaviz.server.uploads import Uploads
+from emaviz.server.viser_private import id_of
 from emaviz.session.compare import COMPARABLE, LAY_OUT, MAP, OPEN, Comparing
 from emaviz.session.data_folder import ACTUATOR_SUFFIX
 from emaviz.session.discover.discovering import Discovering
 from emaviz.session.files import UPLOADED, Description, Opened, Question
 from emaviz.session.session_file import Part
 from emaviz.session.settings import taken
-from emaviz.text.html import Html, HtmlPiece, add_html, html, joined
+from emaviz.text.html import Html, HtmlPiece, add_html, html, joined, note
 
 # --- what a comparison is asked for: the actuator, what may be calibrated, the signals' weights, the window -----------
 
@@ -229,6 +232,60 @@ def _about(one: Question) -> Html:
     return html("<div {}>{}{}. Left empty: {}.{}</div>", _BELOW, one.meaning, other, one.empty, usual)
 
 
+# --- which recordings are held out, to judge the model by ------------------------------------------------------------
+
+
+class HeldOutControls:
+    """A box for each recording, and a button for the one that suggests itself."""
+
+    def __init__(self, page: Page, comparing: Comparing) -> None:
+        self._page, self._comparing = page, comparing
+        gui = page.server.gui
+        self._folder = gui.add_folder("Hold out for validation", visible=False)
+        self._boxes: dict[str, Any] = {}
+        with self._folder:
+            add_html(gui, LONG_LABELS)
+            self._told = add_html(gui)
+            self._take = gui.add_button("Hold it out", icon=viser.Icon.EYE_OFF, visible=False)
+        self._take.on_click(lambda _: page.screen.post("proposal", self._take_proposal))
+
+    def show(self) -> None:
+        """As the session has it; on the screen's thread."""
+        comparing = self._comparing
+        names = list(comparing.opened) if len(comparing.opened) > 1 else []
+        if list(self._boxes) != names:
+            for box in self._boxes.values():
+                box.remove()
+            self._boxes = {}
+            with self._folder:
+                for name in names:
+                    box = self._boxes[name] = self._page.server.gui.add_checkbox(Path(name).name, False)
+                    box.on_update(lambda event, name=name: event.client and self._hold_out(name))
+        for name, box in self._boxes.items():
+            if box.value != (name in comparing.held_out):
+                box.value = name in comparing.held_out
+        one = comparing.proposal
+        self._take.visible = one is not None
+        if one is not None:
+            self._take.label = f"Hold out {Path(one.name).name}"
+            text = f"Proposed: {Path(one.name).name}, since {one.why}. It then shows whether a model is right, or bent."
+        elif comparing.held_out:
+            text = "What is held out is not fitted: a model that is right fits it as well."
+        else:
+            text = "All are fitted. One that is held out would show whether a model is right, or bent to what it saw."
+        self._told.content = note(text)
+        self._folder.visible = bool(names)
+
+    def _hold_out(self, name: str) -> None:
+        self._comparing.hold_out(name, bool(self._boxes[name].value))
+
+    def _take_proposal(self) -> None:
+        one = self._comparing.proposal
+        if one is not None:
+            self._comparing.hold_out(one.name, True)
+            self._comparing.asking.ask(by_hand=False)  # it was compared without, or is being
+
+
 # --- what a session's file holds of Compare: the recordings, and what is asked of them --------------------------------
 
 
@@ -241,6 +298,7 @@ class Asked(msgspec.Struct, frozen=True):
     free: frozenset[str]  # parameters that a calibration may move, by path
     weights: dict[str, float]  # of the signals to fit
     window_s: tuple[float, float] | None = None
+    held_out: frozenset[str] = frozenset()  # of the files
 
 
 def kept(comparing: Comparing, shown: Callable[[], None]) -> Part:
@@ -249,7 +307,13 @@ def kept(comparing: Comparing, shown: Callable[[], None]) -> Part:
     def save() -> dict[str, Any]:
         own = comparing
         asked = Asked(
-            tuple(own.opened), own.actuator_name, own.calibrate, frozenset(own.free), own.weights, own.window_s
+            tuple(own.opened),
+            own.actuator_name,
+            own.calibrate,
+            frozenset(own.free),
+            own.weights,
+            own.window_s,
+            frozenset(own.held_out),
         )
         return msgspec.to_builtins(asked, order="sorted")
 
@@ -275,6 +339,7 @@ def kept(comparing: Comparing, shown: Callable[[], None]) -> Part:
         shown()
         for name in [name for name in comparing.opened if name not in files]:
             comparing.remove(name)
+        comparing.take_held_out([names.get(name, name) for name in asked.held_out], files)
         for name in files:
             comparing.add(name)
 
@@ -305,9 +370,10 @@ def leads(page: Page, discovering: Discovering) -> Leads:
             Lead(
                 "Find what is missing",
                 viser.Icon.BULB,
-                "Takes these measurements to Discover",
+                "Every effect of the library and every fault beside what is left, on this calibration",
                 "discover",
-                lambda: discovering.choose(""),
+                discovering.follow_compare,
+                discovering.go_on,
             ),
             Lead(
                 "Identify faults",
@@ -315,6 +381,7 @@ def leads(page: Page, discovering: Discovering) -> Leads:
                 "Takes the first of these measurements to Identify",
                 "identify",
                 to_identify,
+                colour="gray",
             ),
         ],
     )
@@ -365,6 +432,9 @@ class ComparePanel:
             self._which = gui.add_dropdown("Shown", [_NONE], visible=False)
             self._columns = gui.add_button("Columns…", icon=viser.Icon.TABLE, color="gray", visible=False)
             self._remove = gui.add_button("Remove", icon=viser.Icon.X, color="gray", visible=False)
+            self._held = HeldOutControls(page, comparing)
+        self.to_columns, self.to_fit = (gui.add_button(step) for step in ("To the columns", "To the fit"))
+        add_html(gui, unseen([id_of(self.to_columns), id_of(self.to_fit)]))
         self._mapping = result.step
         self._start = gui.add_button("Compare", icon=viser.Icon.ARROWS_DIFF)
         self._line = JobLine(page, comparing.job, WORKSPACE)
@@ -374,7 +444,9 @@ class ComparePanel:
         self.asked = AskedControls(page, comparing, uploads)
         self._add_it.on_click(lambda _: self._add())
         self._which.on_update(lambda event: event.client and self._post_show(str(self._which.value)))
-        self._columns.on_click(lambda _: page.screen.post("columns", self._open_columns))
+        for button in (self._columns, self.to_columns):
+            button.on_click(lambda _: page.screen.post("columns", self._open_columns))
+        self.to_fit.on_click(lambda _: page.screen.post("fit", self._close_columns))
         self._remove.on_click(lambda _: self._remove_shown())
         self._start.on_click(lambda _: comparing.ask())
         standing.connect(self._start, self._forget_errors)
@@ -384,6 +456,7 @@ class ComparePanel:
         events.failed.connect(
             lambda what, name, why: page.screen.post(f"failed to {what}", lambda: self._failed(what, name, why))
         )
+        events.held.connect(lambda: page.screen.post("held out", self._show_held_out))
         events.removed.connect(lambda: page.screen.post("removed", self._removed))
         events.compared.connect(lambda found: page.screen.post("compared", lambda: result.show(found)))
         events.missing.connect(lambda why, by_hand: page.screen.post("missing", lambda: self._missing(why, by_hand)))
@@ -461,7 +534,7 @@ class ComparePanel:
         everything = dict(self._comparing.opened)
         opened = everything.get(name or "")
         self._shown = opened.name if opened is not None else None
-        self._list.content = recordings_list(everything.values())
+        self._show_held_out()
         self._which.visible = len(everything) > 1
         if everything:
             self._which.options = list(everything)
@@ -478,10 +551,21 @@ class ComparePanel:
             self._mapping.hide()
             self._result.end_preview()
 
+    def _show_held_out(self) -> None:
+        self._list.content = recordings_list(self._comparing.opened.values(), self._comparing.held_out)
+        self._held.show()
+
     def _open_columns(self) -> None:
         opened = self._comparing.opened.get(self._shown or "")
         if opened is not None:
             self._mapping.show(opened)
+
+    def _close_columns(self) -> None:
+        """Back to the comparison, if there is one; edits that were not used are given up."""
+        opened = self._comparing.opened.get(self._shown or "")
+        if opened is not None and opened.measurement is not None:
+            self._mapping.hide()
+            self._result.end_preview()
 
     # --- the run ----------------------------------------------------------------------------------------------------
 
@@ -516,18 +600,31 @@ class CompareTab(Tab):
         super().__init__(shared, right)
         self._standing = self.standing(shared.comparing.provenance)
         with right.add_tab("Comparison", viser.Icon.ARROWS_DIFF):
+            add_html(self.page.server.gui, WINDOW_COLUMNS)
+            shared.correction.add(WORKSPACE.name)
             self._standing.add(self.page.server.gui)
             self.result = ResultPanel(
                 self.page,
                 shared.strip,
                 lambda preview: MappingStep(self.page, shared.comparing, preview),
-                lambda: leads(self.page, shared.discovering),
+                self._leads,
                 lambda: KeepControls(self.page, shared.comparing, shared.viewer),
+                self._run_example,
             )
+
+    def _run_example(self) -> None:
+        self.shared.comparing.open_example()
+        self.panel.asked.show_actuator()
+
+    def _leads(self) -> None:
+        first, *_ = leads(self.page, self.shared.discovering).buttons
+        self.shared.correction.leads(MISSING, first)
 
     def build(self) -> None:
         """Recordings in, what is compared, and the run."""
         self.panel = ComparePanel(self.page, self.shared.comparing, self.result, self.shared.uploads, self._standing)
+        for step, button in ((COLUMNS, self.panel.to_columns), (FIT, self.panel.to_fit)):
+            self.shared.correction.leads(step, button)
 
     def refresh_files(self) -> None:
         """What may be added."""
@@ -539,6 +636,8 @@ class CompareTab(Tab):
         found: dict[str, Sequence[str]] = {"file": list(comparing.opened)}
         if comparing.actuator_name != comparing.session.actuator.name:
             found["actuator"] = [comparing.actuator_name]
+        if comparing.held_out:
+            found["held"] = [name for name in comparing.opened if name in comparing.held_out]
         return found if region is None else {**found, "region": [f"{region + 1}"]}
 
     def go_to(self, place: Place) -> None:
@@ -554,6 +653,7 @@ class CompareTab(Tab):
             self.result.wanted = region
             for one in [one for one in comparing.opened if one not in files]:
                 comparing.remove(one)
+            comparing.take_held_out([one for one in place.get("held", ()) if one in files], files)
             for one in files:
                 comparing.add(one)
         elif region is not None and comparing.comparison is not None:

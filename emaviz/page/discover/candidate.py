@@ -29,10 +29,14 @@ from ema_model.quantities.numbers import number as shown
 from ema_model.quantities.titles import in_sentence
 from ema_model.text import COLOURS
 from emaviz.figures import discovery
+from emaviz.page.style import unseen
+from emaviz.page.window_layout import NEXT_COLUMN
 from emaviz.page.workspaces import Page
+from emaviz.server.viser_private import id_of
 from emaviz.session.discover.discovering import Discovering, Preview, Typed, typed
 from emaviz.session.settings import number as setting_number
-from emaviz.text.html import BOX, Html, add_html, boxed, html, joined, mathml, note, unescaped
+from emaviz.text.html import BOX, WAITS, Html, add_html, boxed, html, joined, mathml, note, unescaped
+from emaviz.text.terms import explained
 
 # --- texts and styles of the Discover tab's cards: what each candidate would do, in one glance ------------------------
 
@@ -51,16 +55,20 @@ def label(look: Look, one: Candidate) -> str:
         return title
     lines = [title]
     if look.is_worth(one):
-        before, after = number(look.rmse), number(look.predicted_rmse(one))
-        if before == after:
-            lines.append("explains a part, but hardly reduces the error by itself")
-        else:
-            lines.append(f"error {before} → ≈ {after} × floor")
+        lines.append(fall(look, one))
         lines += [strength(look, one), confidence(look, one)]
         same = look.assessment.alike.get(one.name, ()) if look.assessment else ()
         if same:
             lines.append("≈ same as " + ", ".join(in_sentence(effect_title(name)) for name in same))
     return "\n".join(lines)
+
+
+def fall(look: Look, one: Candidate) -> str:
+    """'error 3.47 → ≈ 2.98 × floor'."""
+    before, after = number(look.rmse), number(look.predicted_rmse(one))
+    if before == after:
+        return "explains a part, but hardly reduces the error by itself"
+    return f"error {before} → ≈ {after} × floor"
 
 
 def strength(look: Look, one: Candidate) -> str:
@@ -80,8 +88,12 @@ def strength(look: Look, one: Candidate) -> str:
 
 def confidence(look: Look, one: Candidate) -> str:
     """How probable it is that this is missing, and what it would take: '97 % probable, 62 % of the squared error'."""
-    probable = in_percent(look.probability(one))
-    return f"{probable} probable, {100.0 * look.share(one):.0f} % of the squared error"
+    return f"{in_percent(look.probability(one))} probable, {share(look, one)}"
+
+
+def share(look: Look, one: Candidate) -> str:
+    """'62 % of the squared error'."""
+    return f"{100.0 * look.share(one):.0f} % of the squared error"
 
 
 def style(look: Look | None, shown: Sequence[tuple[str, Candidate | None]], opened: str | None) -> Html:
@@ -101,6 +113,162 @@ def style(look: Look | None, shown: Sequence[tuple[str, Candidate | None]], open
         rules.append(f"{button} .mantine-Button-label{{{_LABEL}}}{button} .mantine-Button-label::first-line")
         rules.append("{font-weight:600;font-size:13.5px}")
     return unescaped(f"<style>{''.join(rules)}</style>")
+
+
+# --- the candidates that are worth a refit, large, in the order in which they are probable ----------------------------
+
+MOST = 8  # cards
+_BUTTON = (
+    "font:inherit;color:inherit;cursor:pointer;border-radius:4px;border:1px solid rgba(134,142,150,.6);background:none;"
+)
+CARDS = unescaped(
+    "<style>.emaviz-cards{padding:0 8px 2px;font-size:13px;line-height:1.4}"
+    ".emaviz-card{position:relative;display:grid;grid-template-columns:minmax(0,1fr) minmax(120px,240px);gap:2px 12px;"
+    "padding:7px 10px 9px;margin-bottom:7px;border-radius:6px;border:1px solid rgba(134,142,150,.35);"
+    "border-left:4px solid rgba(134,142,150,.6);background:rgba(134,142,150,.08)}"
+    ".emaviz-card.open{border-left-color:#f08c00}"
+    ".emaviz-card header{grid-column:1/-1;display:flex;gap:8px;align-items:baseline;justify-content:space-between}"
+    f".emaviz-card header button{{{_BUTTON}border:0;padding:0;font-weight:600;font-size:14.5px;text-align:left}}"
+    ".emaviz-card header button:hover{text-decoration:underline}.emaviz-card b{font-weight:600}"
+    ".emaviz-card i{grid-column:1/-1;height:4px;border-radius:2px;background:rgba(134,142,150,.25);overflow:hidden}"
+    ".emaviz-card i>i{display:block;background:#f08c00}"
+    f".emaviz-card .do{{{_BUTTON}padding:2px 12px;margin:5px 6px 0 0}}"
+    ".emaviz-card .add{background:var(--mantine-primary-color-filled,#2f6fde);border-color:transparent;color:#fff;"
+    "font-weight:600}.emaviz-card button:disabled{opacity:.45;cursor:default}"
+    f".emaviz-card .alike{{color:{COLOURS['warning']}}}"
+    ".emaviz-sketch{margin:0;display:flex;flex-direction:column;min-width:0}.emaviz-sketch svg{width:100%;height:auto}"
+    ".emaviz-sketch small{font-size:11px;line-height:1.25;opacity:.75}"
+    "</style>"
+)
+_PRESS = "window.emavizPress('{}')"
+_LEGEND = html(
+    '<div style="opacity:.8;font-size:12px;padding-bottom:5px"><span style="color:{}">●</span> what the model lacks, '
+    '<span style="color:{}">━</span> the candidate\'s signature: where they lie together, this is it. Bar: how '
+    "probable it is that this, of all candidates, is missing.</div>",
+    discovery.RESIDUAL,
+    discovery.SIGNATURE,
+)
+
+
+class Cards:
+    """A folder of the panel on the right: what a click adds, and what it would do."""
+
+    def __init__(self, page: Page, discovering: Discovering) -> None:
+        self._page, self._discovering = page, discovering
+        self._look: Look | None = None
+        self._opened: str | None = None
+        self._sketches: dict[str, Html] = {}  # of this look, by the candidate's name
+        self._running = False
+        gui = page.server.gui
+        self.folder = gui.add_folder("What may be missing", visible=False)
+        with self.folder:
+            add_html(gui, NEXT_COLUMN)
+            self._all = gui.add_button(
+                "Find all",
+                icon=viser.Icon.WAND,
+                hint="Adds, step by step, every effect and fault that the data support",
+            )
+            self._cards = add_html(gui)
+            self._opens, self._adds = (  # which nobody sees: the cards press them
+                [gui.add_button(f"{what} {place + 1}") for place in range(MOST)] for what in ("Open card", "Add card")
+            )
+            add_html(gui, unseen([id_of(one) for one in (*self._opens, *self._adds)]))
+
+    def connect(self, ask: Callable[[Callable[[], bool], Any, str], None], open_card: Callable[[str], None]) -> None:
+        """ask(begin, button, title) starts a step; open_card(name) shows all of a candidate, on the screen's thread."""
+        post = self._page.screen.post
+        self._all.on_click(lambda _: ask(self._discovering.find_all, self._all, ""))
+
+        def add(place: int) -> None:
+            one = self._at(place)
+            if one is not None:
+                ask(lambda: self._discovering.add(one.name), self._all, f"Adding {in_sentence(effect_title(one.name))}")
+
+        def show(place: int) -> None:
+            one = self._at(place)
+            if one is not None:
+                open_card(one.name)
+
+        for place, (opens, adds) in enumerate(zip(self._opens, self._adds)):
+            opens.on_click(lambda _, place=place: post("card", lambda: show(place)))
+            adds.on_click(lambda _, place=place: add(place))
+
+    def busy(self, busy: bool) -> None:
+        """Whether a step runs."""
+        self._running = self._all.disabled = busy
+        self._draw()
+
+    def show(self, look: Look | None) -> None:
+        """A story as it stands."""
+        self._look, self._sketches = look, {}
+        self.folder.visible = look is not None
+        self._draw()
+
+    def open(self, name: str | None) -> None:
+        """Marks the one that is opened."""
+        if name != self._opened:
+            self._opened = name
+            self._draw()
+
+    def _at(self, place: int) -> Candidate | None:
+        shown = self._look.promising[:MOST] if self._look is not None else []
+        return shown[place] if place < len(shown) else None
+
+    def _draw(self) -> None:
+        look = self._look
+        if look is None:
+            return
+        shown = look.promising[:MOST]
+        self._all.visible = bool(shown)
+        if look.assessment is None:
+            told = "Scoring every effect of the library and every fault of the actuator beside the residual …"
+            content = html("<div>{}</div>{}", told, WAITS)
+        elif shown:
+            content = _LEGEND + joined(self._card(look, place, one) for place, one in enumerate(shown))
+        else:
+            content = html("<div>{}</div>", none_left(look))
+        content = html('<div class="emaviz-cards">{}</div>', content)
+        if self._cards.content != content:
+            self._cards.content = content
+
+    def _card(self, look: Look, place: int, one: Candidate) -> Html:
+        if one.name not in self._sketches:
+            self._sketches[one.name] = discovery.sketch(discovery.signature(look, one))
+        title, probable = effect_title(one.name), look.probability(one)
+        same = look.assessment.alike.get(one.name, ()) if look.assessment else ()
+        rivals = ", ".join(in_sentence(effect_title(name)) for name in same)
+        off = Html(" disabled") if self._running else ""
+        return html(
+            '<article class="emaviz-card{}"><header><button onclick="{}" title="Its equation, cause, and what it is '
+            'mistaken for">{}. {}</button><b>{} probable</b></header><i><i style="width:{:.1f}%;height:4px"></i></i>'
+            '<div>{}{}<button class="do add" onclick="{}" aria-label="Add {}"{}>+ Add</button>'
+            '<button class="do" onclick="{}" aria-label="Why {}">Why?</button></div>{}</article>',
+            " open" if one.name == self._opened else "",
+            _PRESS.format(id_of(self._opens[place])),
+            place + 1,
+            title,
+            in_percent(probable),
+            100.0 * probable,
+            joined(
+                html("<div>{}</div>", line)
+                for line in (explained(fall(look, one)), strength(look, one), share(look, one))
+            ),
+            html('<div class="alike">▲ These recordings cannot tell it from {}.</div>', rivals) if rivals else "",
+            _PRESS.format(id_of(self._adds[place])),
+            title,
+            off,
+            _PRESS.format(id_of(self._opens[place])),
+            title,
+            self._sketches[one.name],
+        )
+
+
+def none_left(look: Look) -> str:
+    """Why there is no card."""
+    left = look.assessment.left.explanation if look.assessment else None
+    if left is not None and not look.found.at_floor:
+        return "No candidate explains the residual: try its curve, or an expression of your own, on the left."
+    return "No candidate would reduce the error significantly."
 
 
 # --- sliders for the parameters of a user's torque, and the ranges that they move in ----------------------------------

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import io
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from contextlib import suppress
 from typing import Any
 
@@ -12,7 +12,7 @@ import plotly.graph_objects as go
 import viser
 
 from ema_model.commands import command
-from ema_model.discovery.result import Experiment
+from ema_model.discovery.result import Candidate, Experiment
 from ema_model.discovery.snapshot import Look
 from ema_model.discovery.words import (
     FLOOR_NOTE,
@@ -35,16 +35,19 @@ from ema_model.recordings import SIGNALS, Measurement
 from emaviz.figures import discovery
 from emaviz.figures.discovery import equation
 from emaviz.page.discover import WORKSPACE
-from emaviz.page.discover.candidate import CONFIG, EffectView
-from emaviz.page.panel import KeepButtons, Keeps
+from emaviz.page.discover.candidate import CARDS, CONFIG, Cards, EffectView
+from emaviz.page.panel import Example, KeepButtons, Keeps
 from emaviz.page.playback import PlaybackStrip
-from emaviz.page.window_layout import COLUMNS, NEXT_COLUMN
+from emaviz.page.style import IN_PAIRS
+from emaviz.page.window_layout import ALL_COLUMNS, PLOTS_EARLY
 from emaviz.page.workspaces import Page
 from emaviz.scene.playback import motion
 from emaviz.session.discover import source
 from emaviz.session.discover.discovering import Discovering
-from emaviz.text.html import BOX, Html, add_html, begin, boxed, html, joined, note
+from emaviz.session.discover.history import Entry
+from emaviz.text.html import BOX, Html, add_html, begin, boxed, html, joined, note, waiting
 from emaviz.text.results import folded, large, of_discovery, shown, warned
+from emaviz.text.terms import explained
 
 # --- suggested next test: the command and load that tell rivals apart; into Explore, or as CSV for a rig --------------
 
@@ -163,14 +166,47 @@ def run_of(track: Track, shown: str) -> Measurement:
     return Measurement({"time_s": time_s, "motor_speed_rad_s": np.gradient(motor, time_s), **signals}, track.name)
 
 
+# --- two discoveries side by side -------------------------------------------------------------------------------------
+
+
+class SideBySide:
+    """A folder over the whole width, there while another discovery is chosen to stand beside the one that is shown."""
+
+    def __init__(self, page: Page) -> None:
+        gui = page.server.gui
+        self._folder = gui.add_folder("Side by side", visible=False)
+        with self._folder:
+            add_html(gui, IN_PAIRS + ALL_COLUMNS)
+            self._told = [add_html(gui) for _ in range(2)]
+            self._ladders = [gui.add_plotly(go.Figure(), config=CONFIG, aspect=0.5) for _ in range(2)]
+
+    def show(self, both: Sequence[Entry]) -> None:
+        """Two that have a picture; of fewer nothing is shown."""
+        looks = [(one, one.look) for one in both if one.look is not None]
+        self._folder.visible = len(looks) == 2
+        if not self._folder.visible:
+            return
+        for (entry, look), told, ladder in zip(looks, self._told, self._ladders):
+            title = html("<b>{}. {}</b>", entry.number, entry.subject)
+            found = boxed(equation(look.found, look.added)) if look.removable else Html()
+            said = large(headline(look.found), of_discovery(look.found))
+            told.content = html("<div {}>{}{}{}</div>", BOX, title, said, found)
+            ladder.figure = discovery.error_ladder(look.found)
+
+
 # --- discover's panel on the right ------------------------------------------------------------------------------------
 # Discover's panel on the right: the answer so far, the ladder, the opened candidate, the equation, what is left.
 
 _STEPS = (
     "Choose measurements on the left: those of Compare, or one of the challenges.",
-    Html("Press <b>Start</b>: the model is calibrated, and its residual is compared with every effect of the library."),
+    Html(
+        "Press <b>Find what is missing</b> below a comparison, or <b>Start</b> here: every effect of the library and "
+        "every fault is held beside what the calibrated model leaves, and ranked."
+    ),
     "Add an effect: the error falls, also on what was held out. Then save the improved model, or use it in Explore.",
 )
+_EXAMPLE = "Run an example", "The first bench run of an actuator: three recordings, and one that is held out."
+_WAITING = "The model is calibrated, by a comparison of the same if there is one; then what it leaves is looked at."
 HOME = Keeps(
     "Take it home",
     ".zip",
@@ -200,8 +236,13 @@ class DiscoveryPanel:
         self._look: Look | None = None
         self._titles: dict[str, str] = {}
         gui = page.server.gui
-        add_html(gui, COLUMNS)
-        self._headline = add_html(gui, begin("No discovery yet", _STEPS))
+        self._run_example: Callable[[], object] = lambda: None
+        example = Example(page, *_EXAMPLE, lambda: self._run_example())
+        self._empty = begin("No discovery yet", _STEPS, example.html)
+        add_html(gui, CARDS)
+        self._headline = add_html(gui, self._empty)
+        self.beside = SideBySide(page)
+        add_html(gui, PLOTS_EARLY)
         self._keep_folder = gui.add_folder("Keep it", visible=False)
         with self._keep_folder:  # where it is seen without scrolling
             self._kept = keep()
@@ -217,35 +258,46 @@ class DiscoveryPanel:
         with self._model_folder:
             self._equation = add_html(gui)
             self._kept.add(HOME)
+        self._next = NextTest(page, discovering, load)
+        self._left_folder = gui.add_folder("Remaining residual", visible=False, expand_by_default=False)
+        with self._left_folder:
+            self._left: Any = gui.add_plotly(go.Figure(), config=CONFIG, aspect=0.5, visible=False)
+        self._cards = Cards(page, discovering)
         self._before_folder = gui.add_folder("Before and after", visible=False)
         with self._before_folder:
-            add_html(gui, NEXT_COLUMN)
             self._recording = gui.add_dropdown("Measurement", ["–"])
             self._signal = gui.add_dropdown("Signal", ["–"])
             self._actuator = ActuatorSwitch(page, discovering, self._track, strip)
             self._residual: Any = gui.add_plotly(go.Figure(), config=CONFIG, aspect=0.5, visible=False)
             self._explained: Any = gui.add_plotly(go.Figure(), config=CONFIG, aspect=0.6, visible=False)
-        self._left_folder = gui.add_folder("Remaining residual", visible=False, expand_by_default=False)
-        with self._left_folder:
-            self._left: Any = gui.add_plotly(go.Figure(), config=CONFIG, aspect=0.5, visible=False)
-        self._next = NextTest(page, discovering, load)
         self._recording.on_update(lambda event: event.client and page.screen.post("residual", self._draw_residual))
         self._signal.on_update(lambda event: event.client and page.screen.post("residual", self._draw_residual))
         self._reveal.on_click(lambda _: page.screen.post("reveal", self._revealed))
 
-    def connect(self, ask: Callable[[Callable[[], bool], Any], None], close: Callable[[], None]) -> None:
-        """ask(begin, button) starts a step; close() closes the opened card."""
-        self._effect.connect(ask, close)
+    def connect(
+        self, ask: Callable[..., None], open_card: Callable[[str | None], None], example: Callable[[], object]
+    ) -> None:
+        """ask(begin, button) starts a step; open_card(name) opens a candidate, or closes it, on the screen's thread.
+
+        example(): begins a discovery of something shipped.
+        """
+        self._run_example = example
+        self._effect.connect(ask, lambda: open_card(None))
+        self._cards.connect(ask, open_card)
         self._next.connect(ask)
 
     def busy(self, busy: bool) -> None:
         """Whether a step runs."""
+        if self._look is None:
+            self._headline.content = waiting(self._discovering.job.title, _WAITING) if busy else self._empty
         self._effect.busy(busy)
+        self._cards.busy(busy)
         self._next.busy(busy)
 
     def open(self, name: str | None) -> None:
         """Opens a candidate, or closes it."""
         self._effect.open(self._look, name)
+        self._cards.open(name)
 
     def show(self, look: Look | None) -> None:
         """A story as it stands."""
@@ -258,11 +310,14 @@ class DiscoveryPanel:
         self._model_folder.visible = look is not None and bool(look.removable)
         self._left_folder.visible = look is not None and look.found.unknown is not None
         self._ladder.visible = look is not None
+        self._cards.show(look)
         self._next.show(look)
         if not self._discovering.source.revealed:
             self._truth.content = ""
         if look is None:
-            self._headline.content = begin("No discovery yet", _STEPS)
+            self._headline.content = (
+                waiting(self._discovering.job.title, _WAITING) if self._discovering.running else self._empty
+            )
             self._actuator.refresh()
             return
         found = look.found
@@ -316,31 +371,40 @@ class DiscoveryPanel:
             self._discovering.events.revealed()
 
 
+def next_step(look: Look, best: Candidate) -> str:
+    """'Next: cogging torque, 97 % probable, would bring the error from 3.47 to about 2.98 times the floor.'"""
+    name, probable = in_sentence(effect_title(best.name)), in_percent(look.probability(best))
+    before, after = number(look.rmse), number(look.predicted_rmse(best))
+    would = f"would bring the error from {before} to about {after} times the floor"
+    return f"Next: {name}, {probable} probable, {'explains a part of what is left' if before == after else would}."
+
+
 def answer(look: Look) -> Html:
     """The verdict in words, its warnings, and what 1 means."""
     found = look.found
     meaning = of_discovery(found)
     if look.assessment is None:
-        first, others, meaning = so_far(found), ["Analysing the residual …"], "open"
-    elif not look.added and not found.faults and look.promising and not found.not_claimed:
-        # Nothing was added, of which a verdict could speak, and nothing was tried in vain.
-        left = look.assessment.left.explanation
-        best, meaning = look.promising[0], "warning"
-        before, after = number(look.rmse), number(look.predicted_rmse(best))
-        first = (
-            f"Next: {in_sentence(effect_title(best.name))}, {in_percent(look.probability(best))} probable, would bring "
-            f"the error from {before} to about {after} times the floor."
+        first, _, more = so_far(found).partition(". ")
+        first, others, meaning = (
+            f"{first.rstrip('.')}.",
+            [*([more] if more else []), "Analysing the residual …"],
+            "open",
         )
-        others = [sentences(found)[0], *([left.sentence] if left is not None else [])]
+    elif look.promising and not found.not_claimed:  # nothing was tried in vain
+        best, meaning = look.promising[0], "warning"
+        first = next_step(look, best)
+        left = look.assessment.left.explanation
+        more = [left.sentence] if left is not None and not look.removable else []
+        others = [*([headline(found)] if look.removable else []), sentences(found)[0], *more]
     else:
         first, others = headline(found), sentences(found)
+    told = joined([*(html("<div>{}</div>", text) for text in others), warned(found.warnings)])
     return html(
-        '<div {}>{}{}{}<div style="opacity:.65;font-size:12px" title="{}">The floor is what noise and the model\'s own '
+        '<div {}>{}{}<div style="opacity:.65;font-size:12px" title="{}">The floor is what noise and the model\'s own '
         "limits leave: 1 on the ladder.</div>{}</div>",
         BOX,
         large(first, meaning),
-        joined(html("<div>{}</div>", text) for text in others),
-        warned(found.warnings),
+        explained(told),
         FLOOR_NOTE,
         folded("Each measurement", per_recording(found)),
     )

@@ -20,11 +20,12 @@ from ema_model.faults import CAUSES
 from ema_model.quantities.numbers import number
 from emaviz.page.discover import WORKSPACE, candidate
 from emaviz.page.discover.candidate import OwnEffect
-from emaviz.page.discover.result import HOME, DiscoveryPanel
+from emaviz.page.discover.result import HOME, DiscoveryPanel, SideBySide
 from emaviz.page.explore.tab import ExploreTab, take_experiment
 from emaviz.page.panel import JobLine, KeepButtons, Keeps, Lead, Leads
 from emaviz.page.share import Place
 from emaviz.page.tab import Shared, Standing, Tab
+from emaviz.page.window_layout import COLUMNS
 from emaviz.page.workspaces import Page
 from emaviz.recording.viewer import ViewerHost
 from emaviz.server.uploads import Uploads
@@ -64,16 +65,17 @@ class SourceControls:
         }
         self._names = self._listed()
         gui, post = page.server.gui, page.screen.post
-        self._source = gui.add_dropdown("Measurements", tuple(self._names), hint="Of Compare, or of a challenge")
+        self._source = gui.add_dropdown(
+            "Measurements", tuple(self._names), hint="Of Compare, or of a challenge: ● to ●●●●● say how hard"
+        )
         uploads.add_button("Open a sealed challenge", CHALLENGE_SUFFIX, icon=viser.Icon.LOCK_OPEN, color="gray")
         self._about = add_html(gui)
-        self._held = gui.add_folder("Hold out for validation", visible=False, expand_by_default=False)
-        self._boxes: list[Any] = []
         self._source.on_update(lambda event: event.client and post("source", self._take))
         discovering.sealing.sealed.connect(lambda _: post("sealed listed", self._refresh))
         compare = discovering.comparing.events
         compare.opened.connect(lambda _: post("discover source", lambda: self.show(self._look)))
-        compare.removed.connect(lambda: post("discover source", lambda: self.show(self._look)))
+        for changed in (compare.removed, compare.held):
+            changed.connect(lambda: post("discover source", lambda: self.show(self._look)))
 
     def busy(self, busy: bool) -> None:
         """Whether a step runs."""
@@ -133,32 +135,24 @@ class SourceControls:
         if challenge is not None:
             self._about.content = about(challenge, folded=look is not None)
         else:
+            held = [Path(name).name for name in opened if name in self._discovering.source.held_out]
+            fitted = [Path(name).name for name in opened if name not in self._discovering.source.held_out]
             self._about.content = note(
-                "The measurements and the actuator of Compare."
+                f"The measurements and the actuator of Compare. {of_files(fitted, held)}"
                 if opened
                 else "Open measurements on Compare first, or choose a challenge."
             )
-        self._held.visible = challenge is None and len(opened) > 1
-        for box in self._boxes:
-            box.remove()
-        self._boxes = []
-        if self._held.visible:
-            with self._held:
-                for name in opened:
-                    box = self._page.server.gui.add_checkbox(Path(name).name, name in self._discovering.source.held_out)
-                    box.on_update(lambda _, name=name, box=box: self._hold_out(name, bool(box.value)))
-                    self._boxes.append(box)
         self._shown()
 
-    def _hold_out(self, name: str, held: bool) -> None:
-        self._discovering.source.hold_out(name, held)
-        self._shown()
+
+def of_files(fitted: list[str], held: list[str]) -> str:
+    """'Fitted: chirp, sine. Held out: unseen.'"""
+    return " ".join(f"{what}: {', '.join(names)}." for what, names in (("Fitted", fitted), ("Held out", held)) if names)
 
 
 def about(challenge: Challenge, folded: bool) -> Html:
     """Title, story and recordings; folded once they are read, as the cards want their place."""
-    files = f"Fitted: {', '.join(p.stem for p in challenge.training)}. "
-    files += f"Held out: {', '.join(p.stem for p in challenge.holdout)}."
+    files = of_files([one.stem for one in challenge.training], [one.stem for one in challenge.holdout])
     told = html("<b>{}.</b> {}<div {}>{}</div>", challenge.title, challenge.story, DIM, files)
     if folded:
         told = html(
@@ -268,18 +262,22 @@ class Guide:
 
 # --- the discoveries so far, to go from one to the other --------------------------------------------------------------
 
-_NEW = "New"
+_NEW, _ALONE = "New", "–"
 
 
 class EntriesControl:
-    """A dropdown, there once something was discovered."""
+    """A dropdown, there once something was discovered, and one for a second that is to stand beside the first."""
 
-    def __init__(self, page: Page, discovering: Discovering) -> None:
-        self._page, self._discovering = page, discovering
+    def __init__(self, page: Page, discovering: Discovering, beside: SideBySide) -> None:
+        self._page, self._discovering, self._both = page, discovering, beside
         self._choice: Any = page.server.gui.add_dropdown(
             "Discovery", (_NEW,), visible=False, hint="Each is kept as it was left, and comes back at once"
         )
+        self._beside: Any = page.server.gui.add_dropdown(
+            "Beside", (_ALONE,), visible=False, hint="Another discovery, side by side with this one"
+        )
         self._choice.on_update(self._changed)
+        self._beside.on_update(lambda event: event.client and page.screen.post("beside", self._show_both))
 
     def show(self) -> None:
         """The list as it is now; on the screen's thread."""
@@ -291,6 +289,18 @@ class EntriesControl:
         if self._choice.value != current:
             self._choice.value = current
         self._choice.visible = bool(entries.all)
+        others = [one.words for one in reversed(entries.all) if one.look is not None and one is not entries.current]
+        if list(self._beside.options) != [_ALONE, *others]:
+            chosen = str(self._beside.value)
+            self._beside.options = [_ALONE, *others]
+            self._beside.value = chosen if chosen in others else _ALONE
+        self._beside.visible = bool(others) and entries.current is not None
+        self._show_both()
+
+    def _show_both(self) -> None:
+        entries = self._discovering.entries
+        other = next((one for one in entries.all if one.words == str(self._beside.value)), None)
+        self._both.show([one for one in (entries.current, other) if one is not None])
 
     def busy(self, busy: bool) -> None:
         """Whether a step runs."""
@@ -390,24 +400,14 @@ class DiscoverPanel:
         self._look: Look | None = None
         self._opened: str | None = None
         gui = page.server.gui
-        self._entries = EntriesControl(page, discovering)
+        self._entries = EntriesControl(page, discovering, result.beside)
         self._guide = Guide(page, discovering, lambda: self.source.choose_first())
         self.source = SourceControls(page, discovering, uploads, self._chosen, self._source_shown)
         self._start = gui.add_button("Start", icon=viser.Icon.PLAYER_PLAY)
-        self._all = gui.add_button(
-            "Find all",
-            icon=viser.Icon.WAND,
-            visible=False,
-            hint="Adds, step by step, every effect and fault that the data support",
-        )
         self._line = JobLine(page, discovering.job, WORKSPACE)
-        self._cards_folder = gui.add_folder("What may be missing", visible=False)
-        with self._cards_folder:
-            self._style = add_html(gui)
-            self._hint = add_html(gui)
-            self._worth = [self._slot() for _ in range(8)]
         self._steps = gui.add_folder("The model so far", visible=False)
         with self._steps:
+            self._style = add_html(gui)
             self._model = add_html(gui)
             self._removes = [
                 gui.add_button("Remove", icon=viser.Icon.X, color="gray", visible=False) for _ in range(_MOST_ADDED)
@@ -428,10 +428,9 @@ class DiscoverPanel:
         discovering, post = self._discovering, self._page.screen.post
         self._start.on_click(lambda _: self._begin())
         self._undo.on_click(lambda _: self._page.screen.post("undo", self._step_back))
-        self._all.on_click(lambda _: self.ask(discovering.find_all, self._all))
         for i, button in enumerate(self._removes):
             button.on_click(lambda _, i=i: self._remove(i))
-        self._result.connect(self.ask, lambda: self._open(None))
+        self._result.connect(self.ask, self._turn, self._run_example)
         self._own.connect(self.ask)
         events, job = discovering.events, discovering.job
         job.began.connect(lambda _: post("discover began", lambda: self._busy(True)))
@@ -453,13 +452,17 @@ class DiscoverPanel:
         self._show_start()
         self._guide.show(self._look, self._opened)
 
-    def ask(self, begin: Callable[[], bool], button: Any) -> None:
+    def ask(self, begin: Callable[[], bool], button: Any, title: str = "") -> None:
         """Begins a step, or says why not, beside the button that asks for it."""
-        self._page.begins(begin, button)
+        self._page.begins(begin, button, title, title)
 
     def _begin(self) -> None:
         if not self._page.begins(self._discovering.start, self._start, "Discover"):
             self._discovering.provenance.refused()
+
+    def _run_example(self) -> None:
+        self.source.choose_first()
+        self._begin()
 
     def _forget_errors(self) -> None:
         """What was said of measurements that are not chosen any more."""
@@ -487,7 +490,7 @@ class DiscoverPanel:
         with self._page.server.atomic():
             self._show_start(busy)
             self._start.visible = not busy
-            for control in (self._undo, self._all, *self._removes):
+            for control in (self._undo, *self._removes):
                 control.disabled = busy
             self.source.busy(busy)
             self._entries.busy(busy)
@@ -507,8 +510,7 @@ class DiscoverPanel:
         if look is None or (self._opened is not None and look.candidate(self._opened) is None):
             self._opened = None
         with self._page.server.atomic():
-            for one in (self._all, self._steps, self._cards_folder):
-                one.visible = look is not None
+            self._steps.visible = look is not None
             self._draw_model(look)
             self._draw_cards(look)
             self._own.show(look)
@@ -539,7 +541,11 @@ class DiscoverPanel:
     def _click(self, button: Any) -> None:
         one = next((one for uuid, one in self._shown() if uuid == id_of(button)), None)
         if one is not None:
-            self._open(None if one.name == self._opened else one.name)
+            self._turn(one.name)
+
+    def _turn(self, name: str | None) -> None:
+        """Opens a candidate, or closes the one that is open."""
+        self._open(None if name == self._opened else name)
 
     def _open(self, name: str | None) -> None:
         self._opened = name
@@ -549,14 +555,10 @@ class DiscoverPanel:
 
     def _groups(self) -> list[tuple[Any, list[Any], list[Candidate]]]:
         known = self._look.assessment.candidates if self._look and self._look.assessment else ()
-        worth = self._look.promising[: len(self._worth)] if self._look else []
+        worth = self._look.promising[: candidate.MOST] if self._look else []
         never = [one for one in known if one.obstacle]
         little = [one for one in known if one not in worth and one not in never]
-        return [
-            (self._cards_folder, self._worth, worth),
-            (self._little_folder, self._little, little),
-            (self._never_folder, self._never, never),
-        ]
+        return [(self._little_folder, self._little, little), (self._never_folder, self._never, never)]
 
     def _shown(self) -> list[tuple[str, Candidate | None]]:
         found: list[tuple[str, Candidate | None]] = []
@@ -566,27 +568,12 @@ class DiscoverPanel:
 
     def _draw_cards(self, look: Look | None) -> None:
         for folder, slots, ones in self._groups():
-            if folder is not self._cards_folder:
-                folder.visible = bool(ones)
+            folder.visible = bool(ones)
             for i, slot in enumerate(slots):
                 slot.visible = i < len(ones)
                 if i < len(ones) and look is not None:
                     slot.label = candidate.label(look, ones[i])
         self._style.content = candidate.style(look, self._shown(), self._opened)
-        self._hint.content = note(self._advice(look))
-
-    @staticmethod
-    def _advice(look: Look | None) -> str:
-        if look is None:
-            return ""
-        if look.assessment is None:
-            return "Analysing the residual and scoring the library's effects and the actuator's faults …"
-        if look.promising:
-            bar = "The bar is how probable it is that this, of all candidates, is missing."
-            return f"{bar} Click a card to see why, and to add it."
-        if look.assessment.left.explanation is not None and not look.found.at_floor:
-            return "No candidate explains the residual: try its curve, or an expression of your own, below."
-        return "No candidate would reduce the error significantly."
 
 
 def _so_far(look: Look) -> str:
@@ -608,6 +595,8 @@ class DiscoverTab(Tab):
         super().__init__(shared, right)
         self._standing = self.standing(shared.discovering.provenance)
         with right.add_tab("Discovery", viser.Icon.BULB):
+            add_html(self.page.server.gui, COLUMNS)
+            shared.correction.add(WORKSPACE.name)
             self._standing.add(self.page.server.gui)
             self.result = DiscoveryPanel(
                 self.page,

@@ -57,7 +57,7 @@ PRESETS: dict[str, NDArray[np.float64]] = {
         )
         for severity, value in (("low", 0.25), ("high", 0.75))
     },
-    "several faults (thesis, T 5.3)": _MULTI_FAULT,
+    "several faults, as in the thesis": _MULTI_FAULT,
 }
 
 

@@ -17,7 +17,7 @@ from ema_model.identification.words import CORRECTED, way_sentences
 from emaviz.figures import identification
 from emaviz.figures.identification import LiveConvergence, LiveFit, Row, colour, fault_bars, table
 from emaviz.page.identify import WORKSPACE
-from emaviz.page.panel import JobLine
+from emaviz.page.panel import Example, JobLine
 from emaviz.page.playback import PlaybackStrip
 from emaviz.page.tab import Standing
 from emaviz.page.window_layout import COLUMNS, NEXT_COLUMN
@@ -25,7 +25,7 @@ from emaviz.page.workspaces import Page
 from emaviz.scene.playback import PLAYED, motion
 from emaviz.session.identify import Frame, Landscapes, Race, Track, ends
 from emaviz.session.jobs import Worker
-from emaviz.text.html import Html, add_html, begin, joined, note
+from emaviz.text.html import Html, add_html, begin, joined, note, waiting
 from emaviz.text.results import sure_words
 
 # --- how the swarm is looked at ---------------------------------------------------------------------------------------
@@ -269,6 +269,12 @@ _LEAST_S = 0.1  # between two pictures of a swarm, which browsers in software dr
 _MOST_ROWS = 200
 
 
+_EXAMPLE = "Run an example", "Friction, backlash and eccentricity are set on Explore's sliders, and found again."
+
+
+_WAITING = "The model is run for a population of faults until its current is the measured one."
+
+
 class IdentifyResult:
     """Drawn on the screen's thread, what changes slowly on the slow one's; strip: its clock, for what is identified."""
 
@@ -280,8 +286,9 @@ class IdentifyResult:
         strip: PlaybackStrip,
         standing: Standing,
         to_explore: Callable[[Suggestion], None],
+        example: Callable[[], object],
     ) -> None:
-        """to_explore(run): sets a run there."""
+        """to_explore(run): sets a run there; example(): identifies faults of the sliders' plant."""
         self._page, self._slow, self._strip, self._to_explore = page, slow, strip, to_explore
         self._race: Race | None = None
         self._begun: Race | None = None  # of which something was drawn
@@ -292,7 +299,9 @@ class IdentifyResult:
         with panel.add_tab(_SEARCH, viser.Icon.CHART_DOTS):
             standing.add(gui)
             add_html(gui, COLUMNS)
-            self._empty: Any = add_html(gui, begin("Nothing is identified yet", _STEPS))
+            shipped = Example(page, *_EXAMPLE, example)
+            self._nothing = begin("Nothing is identified yet", _STEPS, shipped.html)
+            self._empty: Any = add_html(gui, self._nothing)
             self._convergence = LiveConvergence(gui)
             self._convergence.handle.visible = False
             page.workspaces.heights.add([self._convergence.handle], spare_px=160, beside_px=332)
@@ -399,6 +408,11 @@ class IdentifyResult:
         if self._empty.visible:
             self._empty.visible, self._convergence.handle.visible = False, True
             self._swarm.appear()
+
+    def busy(self, busy: bool) -> None:
+        """Whether a search goes on: until it has told something, it is said that it does."""
+        if self._empty.visible:
+            self._empty.content = waiting("Searching for the faults", _WAITING) if busy else self._nothing
 
     def _draw(self, race: Race, soon: bool) -> None:
         begun = race is not self._begun

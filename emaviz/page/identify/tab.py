@@ -10,6 +10,7 @@ import msgspec
 import viser
 
 from ema_model.errors import InputError, quoted
+from ema_model.faults import vector
 from ema_model.identification.run import ALGORITHMS
 from ema_model.identification.words import facts, verdict, why_best
 from ema_model.recordings import write_measurement
@@ -32,6 +33,7 @@ from emaviz.session.inputs import ResultFiles
 from emaviz.session.session_file import Part
 from emaviz.session.settings import SLIDERS, Settings, limits, taken
 from emaviz.text.html import Html, add_html, html, joined
+from emaviz.text.terms import explained
 
 # --- the Identify tab: what is identified, by which algorithms, and the race that one watches -------------------------
 
@@ -68,7 +70,13 @@ class IdentifyPanel:
             }
             self._population = gui.add_number("Population", settings.population, **of("population"), step=1)
             self._iterations = gui.add_number("Iterations", settings.iterations, **of("iterations"), step=1)
-            self._fitness: Any = gui.add_dropdown("Fitness", FITNESSES, initial_value=settings.fitness)
+            self._fitness: Any = gui.add_dropdown(
+                "Fitness",
+                FITNESSES,
+                initial_value=settings.fitness,
+                hint="What a search makes small, the current's rms error: filtered compares means over 0.5 ms, without "
+                "the inverter's ripple, which the model does not have; raw every sample, as the thesis does",
+            )
             self._seed = gui.add_number("Seed", settings.seed, min=0, step=1)  # a maximum would be put in silently
         for entry, name in (
             (self._population, "population"),
@@ -99,7 +107,7 @@ class IdentifyPanel:
         self._source.on_update(lambda event: event.client and page.screen.post("identify source", self._take_source))
         for tick in self._ticks.values():
             tick.on_update(lambda event: event.client and page.screen.post("algorithms", self._take_algorithms))
-        self._start.on_click(lambda _: self._begin())
+        self._start.on_click(lambda _: self.begin())
         standing.connect(self._start, self._forget_errors)
         self._watch.on_click(lambda event: page.screen.post("watch", lambda: self._watch_growing(event.client)))
         self._missing.on_click(
@@ -153,7 +161,8 @@ class IdentifyPanel:
 
     # --- the race ---------------------------------------------------------------------------------------------------
 
-    def _begin(self) -> None:
+    def begin(self) -> None:
+        """The search, as the controls say."""
         if not self._page.begins(self._page.session.identify, self._start):
             self._page.session.identifying.provenance.refused()
 
@@ -167,8 +176,10 @@ class IdentifyPanel:
         self._start.disabled = True
         self._text.content = self._link.content = ""
         self._missing.visible = False
+        self._result.busy(True)
 
     def _ended(self) -> None:
+        self._result.busy(False)
         self._start.disabled = self._watch.visible = False
 
     def _watch_growing(self, client: viser.ClientHandle | None) -> None:
@@ -201,7 +212,7 @@ class IdentifyPanel:
             self._link.content = recording_link(self._viewer, race.growing, "Watch it live ↗")
             self._watch.visible = self._viewer is not None
         self._race = race
-        self._text.content = joined(lines)
+        self._text.content = explained(joined(lines))
 
     def _draw_answer(self, race: Race) -> None:
         best = race.best
@@ -213,7 +224,7 @@ class IdentifyPanel:
         if best is not None and best.answer is not None and len(race.answers) > 1:
             others = [answer for answer in race.answers if answer is not best.answer]
             lines.append(_line(html(_WHY, why_best(best.answer, others))))
-        self._text.content = joined(lines)
+        self._text.content = explained(joined(lines))
         self._race = race
         self._missing.visible = best is not None and best.answer is not None and not best.answer.uncertainty.adequate
         self._result.finished(race)
@@ -260,6 +271,9 @@ def take_to_discover(page: Page, discovering: Discovering, race: Race) -> None:
 # --- the Identify tab: the search for the faults, watched, and its answer ---------------------------------------------
 
 
+_FAULTS = {"k1": 0.25, "k2": 0.7, "k6": 0.5}  # of the example
+
+
 class IdentifyTab(Tab):
     """Leads to Explore for the next run, to Recordings for the viewer, to Discover where the model does not fit."""
 
@@ -285,6 +299,7 @@ class IdentifyTab(Tab):
             shared.strip,
             self._standing,
             lambda run: take_separating(shared.tab(ExploreTab).panel, run),
+            self._run_example,
         )
 
     def build(self) -> None:
@@ -299,6 +314,17 @@ class IdentifyTab(Tab):
             open_viewer=lambda url, name: shared.tab(RunsTab).follow(url, name),
             to_discover=partial(take_to_discover, self.page, shared.discovering),
         )
+        shared.tab(RunsTab).result.run_example = self._run_example
+
+    def _run_example(self) -> None:
+        """Faults that the sliders' plant then has, and their search."""
+        settings = self.page.session.settings
+        settings.set("k", list(vector(_FAULTS)))
+        settings.set("source", SLIDERS)
+        for tab in self.shared.tabs.values():
+            tab.show_settings()
+        self.page.session.refresh()
+        self.panel.begin()
 
     def place(self) -> Place:
         """The recording of the answer."""

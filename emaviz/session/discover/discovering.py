@@ -232,6 +232,26 @@ class Discovering:
 
     # --- steps ------------------------------------------------------------------------------------------------------
 
+    @property
+    def is_of_compare(self) -> bool:
+        """Whether what is shown is of Compare's recordings as they are chosen now."""
+        of = self.provenance.of
+        return (
+            self.source.challenge is None
+            and self.look is not None
+            and of is not None
+            and not of.changed(self.source.inputs())
+        )
+
+    def follow_compare(self) -> None:
+        """Chooses Compare's recordings, unless they are what is shown; `go_on` then begins."""
+        if not self.is_of_compare:
+            self.choose("")
+
+    def go_on(self) -> bool:
+        """Begins to look for what is missing, unless that is known; False while another long run goes on."""
+        return self.is_of_compare or self.start()
+
     def start(self) -> bool:
         """Calibrates the model, and looks for what may be missing; False while another long run goes on.
 
@@ -245,17 +265,18 @@ class Discovering:
             return True
         if not self.source.ready:
             raise InputError(NOTHING)
-        inputs = self.source.inputs()
+        inputs, compared = self.source.inputs(), self.source.finished
 
         def job(tell: Tell) -> None:
-            told = self._shown.begin(self.source.recipe(), tell)
+            told = self._shown.begin(self.source.recipe(), tell, compared)
             self._stories.forget()
             if self.entries.current is not None:
                 self.entries.current.inputs = inputs
             self.provenance.take(inputs)
             self._shown.assess(told, tell)
 
-        return self.provenance.begin(lambda: self.job.begin("Calibrating the model", job), inputs)
+        title = "Calibrating the model" if compared is None else "Looking for what is missing"
+        return self.provenance.begin(lambda: self.job.begin(title, job), inputs)
 
     def add(self, name: str) -> bool:
         """The best of that effect, or that fault, into the model, refitted; then looks again."""

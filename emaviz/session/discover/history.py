@@ -15,6 +15,7 @@ import numpy as np
 from ema_model.actuator.write import as_toml
 from ema_model.challenges import Challenge
 from ema_model.comparison.explain import Explanation
+from ema_model.comparison.result import Comparison
 from ema_model.discovery import Candidate, Story, begun, result_of
 from ema_model.discovery.history import Step
 from ema_model.discovery.refit import Trial, with_drops
@@ -334,11 +335,11 @@ class Shown:
         self._entries.current, self.told, self.look = entry, entry.told, entry.look
         self._looked(self.look)
 
-    def begin(self, recipe: Recipe, tell: Tell) -> Telling:
-        """A story of its own: reads what the recipe says, and calibrates."""
+    def begin(self, recipe: Recipe, tell: Tell, compared: Comparison | None = None) -> Telling:
+        """A story of its own: reads what the recipe says, and calibrates, from a comparison of the same on."""
         tell("reading")
         given = self._source.read(recipe)
-        told = Telling(begun(given.fitted, given.actuator, given.held, given.signals, tell), recipe)
+        told = Telling(begun(given.fitted, given.actuator, given.held, given.signals, tell, compared), recipe)
         self._entries.begin(told)
         self.told, self.look, self._source.revealed = told, None, False
         return told

@@ -21,6 +21,7 @@ from ema_model.challenges import Challenge, challenges, folder, opened, sealed_c
 from ema_model.challenges.challenge import SUFFIX
 from ema_model.challenges.truth import SENSORS, Truth, read_truth, seal, unseal
 from ema_model.commands import command
+from ema_model.comparison.result import Comparison
 from ema_model.discovery import Discovery
 from ema_model.discovery.result import Added, Experiment
 from ema_model.discovery.words import effect_title, fitted_of, value
@@ -291,7 +292,6 @@ class DiscoverySource:
         self.challenge: Challenge | None = None  # else the recordings of Compare
         self.chosen = ""  # the challenge's name, or its sealed file's in the data folder
         self.revealed = False  # the challenge's truth
-        self.held_out: set[str] = set()  # of Compare's recordings, by name
         self._comparing = comparing
 
     @property
@@ -308,9 +308,19 @@ class DiscoverySource:
             return sealed_challenge(self._comparing.folder.challenge(name))
         return self.challenges.get(name)
 
+    @property
+    def held_out(self) -> set[str]:
+        """Names of Compare's recordings that are not fitted, there and here."""
+        return self._comparing.held_out
+
     def hold_out(self, name: str, held: bool) -> None:
         """Whether one of Compare's recordings is kept from the fit, to judge by."""
-        self.held_out = self.held_out | {name} if held else self.held_out - {name}
+        self._comparing.hold_out(name, held)
+
+    @property
+    def finished(self) -> Comparison | None:
+        """Compare's result, if it is of what is chosen here, too."""
+        return None if self.challenge is not None else self._comparing.finished
 
     @property
     def compared(self) -> dict[str, Measurement]:
@@ -368,12 +378,14 @@ class DiscoverySource:
     def take(self, recipe: Recipe) -> None:
         """Chooses what a recipe says."""
         self.choose(recipe.challenge)
-        self.held_out = set(recipe.held)
+        if not recipe.challenge:
+            self._comparing.take_held_out(recipe.held)
 
     def recall(self, recipe: Recipe, challenge: Challenge | None, revealed: bool) -> None:
         """Chooses again what a story was made from, without reading anything."""
         self.challenge, self.chosen, self.revealed = challenge, recipe.challenge, revealed
-        self.held_out = set(recipe.held)
+        if not recipe.challenge:
+            self._comparing.take_held_out(recipe.held)
 
     def read(self, recipe: Recipe) -> Material:
         """Reads what a recipe says; InputError for files that are gone, or that make no sense."""

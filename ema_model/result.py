@@ -1,0 +1,178 @@
+"""What every analysis answers with: a frozen dataclass that says, shows, exports and restores itself.
+
+A field is in the JSON form where its type says what it means: `Annotated[float, Meta(description="Hz")]`.  So is a
+property with such a type, which is told and not restored.  The schema is made of the same types.
+"""
+
+from __future__ import annotations
+
+import importlib
+from collections.abc import Mapping
+from dataclasses import fields, is_dataclass
+from functools import cache
+from importlib.metadata import entry_points
+from pathlib import Path
+from types import NoneType, UnionType
+from typing import Annotated, Any, Protocol, Self, TypedDict, Union, get_args, get_origin, get_type_hints
+
+import msgspec
+import numpy as np
+from msgspec import Meta
+
+from ema_model.errors import InputError, quoted
+from ema_model.files.written import whole_file
+from ema_model.quantities.numbers import plain
+from ema_model.text import InWords, Lines
+
+VIEWS = "ema_model.views"  # the group of entry points of packages that show results
+
+
+class Shows(Protocol):
+    """What a package offers that shows results; its entry point in the group `VIEWS` is a module with these."""
+
+    SUFFIXES: tuple[str, ...]
+
+    def figures(self, result: Any) -> list[Any]:
+        """The figures of a result, in reading order."""
+        ...
+
+    def export(self, result: Any, path: Path) -> None:
+        """Writes a result, in the form that the suffix names."""
+        ...
+
+
+class Result(InWords):
+    """Base of the frozen dataclasses that analyses return; `document` says it in words, for print and notebooks."""
+
+    def to_dict(self) -> dict[str, Any]:
+        """The JSON form: plain values only; a number that is not finite is None."""
+        return _as_dict(self)
+
+    @classmethod
+    def from_dict(cls, given: Mapping[str, Any]) -> Self:
+        """What `to_dict` gave; InputError, one line, for what does not fit the types."""
+        try:
+            return msgspec.convert(_stored(given, cls), cls, dec_hook=_array)
+        except (msgspec.ValidationError, ValueError, TypeError) as error:
+            raise InputError(f"no {cls.__name__} can be made of it ({quoted(error, 120)}); compute it anew") from None
+
+    @property
+    def sentences(self) -> list[str]:
+        """All that `document` says in sentences, its tables left out."""
+        told = self.document.blocks
+        return [line for block in told if isinstance(block, Lines) for line in block.lines]
+
+    def figures(self) -> list[Any]:
+        """Plotly figures in reading order, of the package that shows results."""
+        return _shows().figures(self)
+
+    def export(self, path: str | Path) -> None:
+        """Writes a file whose suffix names its form: .json, .csv, .html (a report), .rrd (for the Rerun viewer).
+
+        It is written whole or not at all; InputError, one line, where it cannot be.
+        """
+        target = Path(path)
+        if target.suffix == ".json":
+            with whole_file(target) as draft:
+                draft.write_bytes(msgspec.json.format(msgspec.json.encode(self.to_dict()), indent=1) + b"\n")
+            return
+        shows = _shows()
+        if target.suffix not in shows.SUFFIXES:
+            known = ", ".join((".json", *shows.SUFFIXES))
+            raise InputError(f"{quoted(target)}: a result is written as {known}; let the name end in one of these")
+        shows.export(self, target)
+
+
+@cache
+def _shows() -> Shows:
+    """The installed package that shows results: the science itself knows none."""
+    found = [one for one in entry_points(group=VIEWS)]
+    if not found:
+        raise InputError("no package is installed that shows results; install emaviz anew")
+    return importlib.import_module(found[0].value)  # type: ignore[return-value]  a module is what it offers
+
+
+# --- the JSON form and its schema, both of a class's types ------------------------------------------------------------
+
+
+@cache
+def described(kind: type) -> dict[str, Any]:
+    """The types of what is in the JSON form of a dataclass, by name: its fields, then its properties."""
+    hints = get_type_hints(kind, include_extras=True)
+    found = {one.name: hints[one.name] for one in fields(kind)}
+    for base in reversed(kind.__mro__):
+        for name, one in vars(base).items():
+            if isinstance(one, property) and one.fget is not None:
+                found[name] = get_type_hints(one.fget, include_extras=True).get("return")
+    return {name: of for name, of in found.items() if any(isinstance(m, Meta) for m in getattr(of, "__metadata__", ()))}
+
+
+@cache
+def json_type(kind: type) -> Any:
+    """A TypedDict of the JSON form of a dataclass: what its schema is made of, and what a document is held against."""
+    made = TypedDict(kind.__name__, {name: _json(of) for name, of in described(kind).items()})  # type: ignore[operator]
+    made.__doc__ = (kind.__doc__ or "").strip().partition("\n")[0]
+    return made
+
+
+def _json(of: Any) -> Any:
+    """A type of the JSON form, of one of a field."""
+    origin, parts = get_origin(of), get_args(of)
+    if origin is Annotated:
+        inner, *said = parts
+        dimensions = next((one.extra["dimensions"] for one in said if isinstance(one, Meta) and one.extra), 1)
+        made = _rows(dimensions) if get_origin(inner) is np.ndarray else _json(inner)
+        return Annotated[(made, *said)]
+    if origin is np.ndarray:
+        return _rows(1)
+    if isinstance(of, type) and is_dataclass(of):
+        return json_type(of)
+    if origin is tuple:
+        if parts[-1] is ...:
+            return list[_json(parts[0])]
+        return Annotated[list[_json(parts[0])], Meta(min_length=len(parts), max_length=len(parts))]
+    if origin in (Union, UnionType):
+        return Union[tuple(_json(one) for one in parts)]  # noqa: UP007  made of parts
+    if parts:
+        return origin[tuple(_json(one) for one in parts)]  # type: ignore[index]
+    return of
+
+
+def _rows(dimensions: int) -> Any:
+    return list[_rows(dimensions - 1)] if dimensions else float | None
+
+
+def _as_dict(value: Any) -> Any:
+    if is_dataclass(value) and not isinstance(value, type):
+        return {name: _as_dict(getattr(value, name)) for name in described(type(value))}
+    if isinstance(value, Mapping):
+        return {name: _as_dict(one) for name, one in value.items()}
+    if isinstance(value, list | tuple):
+        return [_as_dict(one) for one in value]
+    return plain(value.tolist() if isinstance(value, np.ndarray) else value)
+
+
+def _stored(given: Any, kind: Any) -> Any:
+    """The same without what properties tell, which fields hold already; None in place of a number is NaN."""
+    if get_origin(kind) is Annotated:
+        return _stored(given, get_args(kind)[0])
+    if isinstance(given, Mapping) and isinstance(kind, type) and is_dataclass(kind):
+        hints = get_type_hints(kind, include_extras=True)
+        return {one.name: _stored(given[one.name], hints[one.name]) for one in fields(kind) if one.name in given}
+    if given is None:
+        return float("nan") if kind is float else None
+    parts = [one for one in get_args(kind) if one not in (NoneType, ...)]
+    if isinstance(given, Mapping) and get_origin(kind) is dict:
+        return {name: _stored(one, parts[1]) for name, one in given.items()}
+    if get_origin(kind) in (Union, UnionType):
+        return _stored(given, parts[0]) if len(parts) == 1 else given
+    if isinstance(given, list | tuple) and get_origin(kind) in (list, tuple):
+        return [_stored(one, parts[min(i, len(parts) - 1)]) for i, one in enumerate(given)]
+    return given
+
+
+def _array(kind: Any, given: Any) -> Any:
+    """Of msgspec: what it has no reader for."""
+    if get_origin(kind) is np.ndarray or kind is np.ndarray:
+        return np.array(given, dtype=float)  # None becomes NaN
+    raise NotImplementedError(f"{kind} is not restored")

@@ -7,13 +7,13 @@ property with such a type, which is told and not restored.  The schema is made o
 from __future__ import annotations
 
 import importlib
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import fields, is_dataclass
 from functools import cache
 from importlib.metadata import entry_points
 from pathlib import Path
 from types import NoneType, UnionType
-from typing import Annotated, Any, Protocol, Self, TypedDict, Union, get_args, get_origin, get_type_hints
+from typing import Annotated, Any, Protocol, Self, TypedDict, Union, cast, get_args, get_origin, get_type_hints
 
 import msgspec
 import numpy as np
@@ -31,14 +31,8 @@ class Shows(Protocol):
     """What a package offers that shows results; its entry point in the group `VIEWS` is a module with these."""
 
     SUFFIXES: tuple[str, ...]
-
-    def figures(self, result: Any) -> list[Any]:
-        """The figures of a result, in reading order."""
-        ...
-
-    def export(self, result: Any, path: Path) -> None:
-        """Writes a result, in the form that the suffix names."""
-        ...
+    figures: Callable[[Any], list[Any]]  # of a result, in reading order
+    export: Callable[[Any, Path], None]  # writes a result in the form that the suffix names
 
 
 class Result(InWords):
@@ -83,13 +77,22 @@ class Result(InWords):
         shows.export(self, target)
 
 
-@cache
+_at_hand: list[Shows] = []
+
+
+def shown_by(package: Shows) -> None:
+    """Has a package show results that is imported already, as where the program runs from its sources."""
+    _at_hand[:] = [package]
+
+
 def _shows() -> Shows:
-    """The installed package that shows results: the science itself knows none."""
-    found = [one for one in entry_points(group=VIEWS)]
-    if not found:
+    """The package that shows results, else the installed one: the science itself knows none."""
+    if not _at_hand:
+        for one in entry_points(group=VIEWS):
+            shown_by(cast(Shows, importlib.import_module(one.value)))  # a module is what it offers
+    if not _at_hand:
         raise InputError("no package is installed that shows results; install emaviz anew")
-    return importlib.import_module(found[0].value)  # type: ignore[return-value]  a module is what it offers
+    return _at_hand[0]
 
 
 # --- the JSON form and its schema, both of a class's types ------------------------------------------------------------

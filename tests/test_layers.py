@@ -49,6 +49,7 @@ FLOORS = {
         ["recording"],
         ["figures", "formats"],
         ["report"],
+        ["views"],
         ["session"],
         ["server"],
         ["scene"],

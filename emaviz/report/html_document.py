@@ -18,7 +18,7 @@ from plotly.offline import get_plotlyjs
 
 from ema_model.errors import InputError, quoted
 from ema_model.files.written import whole_file
-from ema_model.text import InWords, Lines, Note, Table
+from ema_model.text import Block, InWords, Lines, Note, Table
 from emaviz import __version__
 from emaviz.figures.theme import DARK, LIGHT
 
@@ -208,6 +208,20 @@ def _own(name: str) -> str:
 # --- the section that says what the terminal says ---------------------------------------------------------------------
 
 
+def in_words(blocks: Iterable[Block]) -> str:
+    """Blocks of a result's document, one after another."""
+    return "".join(map(_block, blocks))
+
+
+def _block(block: Block) -> str:
+    if isinstance(block, Lines):
+        head = paragraph(block.title) if block.title else ""
+        return head + "".join(paragraph(line) for line in block.lines)
+    if isinstance(block, Note):
+        return bullets([block.line], "warning")
+    return with_remarks(block) if isinstance(block, Table) else ""
+
+
 class WordsSection(Section[Subject]):
     """The document of a result, block by block; a report's own file gives it to it."""
 
@@ -217,13 +231,4 @@ class WordsSection(Section[Subject]):
     def body(self, subject: Subject, figures: Figures) -> str:
         """Always there."""
         assert isinstance(subject, InWords)
-        written = []
-        for block in subject.document.blocks:
-            if isinstance(block, Lines):
-                written += [paragraph(block.title)] if block.title else []
-                written += [paragraph(line) for line in block.lines]
-            elif isinstance(block, Note):
-                written.append(bullets([block.line], "warning"))
-            elif isinstance(block, Table):
-                written.append(with_remarks(block))
-        return "".join(written)
+        return in_words(subject.document.blocks)

@@ -10,10 +10,12 @@ from __future__ import annotations
 import importlib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from ema_model.members import stated
-from ema_model.result import Result
+
+if TYPE_CHECKING:
+    from ema_model.result import Result
 
 _PACKAGE = "ema_model.analyses"
 
@@ -34,7 +36,7 @@ class Analysis:
     name: str  # of the file, of the verb, and in the page's address
     title: str
     help: str
-    place: int  # among the verbs
+    place: float  # among the verbs
     options: Mapping[str, Option]
 
     @property

@@ -42,7 +42,7 @@ Complex = NDArray[np.complex128]
 
 TITLE = "Frequency response"
 HELP = "show the measured frequency response beside the model's: resonance, damping, delay, coherence"
-PLACE = 7
+PLACE = 6.5
 OPTIONS = {
     "input": {
         "title": "Input",
@@ -92,15 +92,15 @@ _CHANCE = 0.05  # with which noise alone seems coherent
 _LEAST_LINES = 10  # frequencies that count
 _BEYOND = 1.2  # times the last of them, to which responses are shown
 _LEAST_ERROR = 0.02  # of ln H: what the pieces leave of a sharp peak
-_VAGUE = 0.3  # of its frequency, from which half width of the interval on it is none
 _UNKNOWN = 5.0  # of a logarithm: an interval as wide as that means anything
 _SHARP = 0.35  # damping, up to which it is a resonance: a peak of 3 dB
 _PAID = 10.0  # of χ², beyond its own parameters' price, that a factor of H must take away
 _BETTER = 0.7  # times, that it must leave of χ²
 _ALIKE_LINES = 1.5  # neighbouring lines under Hann's window that tell one thing
-_MOST_TRIALS = 200  # of a fit
+_MOST_TRIALS, _FIRST_TRIALS = 200, 30  # of a fit, and of one that begins
 _MOST_EXTREMES = 3  # peaks and dips at which a fit begins
 _FITS = 4.0  # χ² over its degrees of freedom, up to which a delay is told
+_RESEMBLES = 10.0  # the same for a resonance, which is seen in the magnitude as well
 _EDGE = 2  # lines at each end of the band, in which no resonance is told
 _EARLY = 2.0  # steps between compared values, by which a delay may be less than none
 _FAR = 30.0  # of the gain's logarithm, from its start
@@ -292,18 +292,18 @@ def _channel(model: ClosedLoop, input: str, output: str) -> tuple[str, str]:
     if input != "auto":
         own = [name for name in _INPUTS[input] if name == window.input or all(name in m for m in model.measurements)]
         for one in model.measurements:
-            one.require(own[0] if own else _INPUTS[input][0], without="or choose another --input")
+            one.require(own[0] if own else _INPUTS[input][0], without="or choose another input")
         first = own[0]
         if first != window.input and first != "current_A":
             raise InputError(f"the model is driven by {model.actuator.axes.signal(window.input)}, which leaves no "
-                             f"{model.actuator.axes.signal(first)} of its own; choose another --input")  # fmt: skip
+                             f"{model.actuator.axes.signal(first)} of its own; choose another input")  # fmt: skip
     wanted = ("user", "motor", "speed") if first == "command_rad" else ("speed", "motor", "user")
     known = [_OUTPUTS[one] for one in (wanted if output == "auto" else (output,))]
     there = [name for name in known if name != first and all(name in one.measured for one in model.windows)]
     if not there:
         for one in model.measurements:
-            one.require(known[0], without="or choose another --output")
-        raise InputError(f"the output {model.actuator.axes.signal(known[0])} is the input; choose another --output")
+            one.require(known[0], without="or choose another output")
+        raise InputError(f"the output {model.actuator.axes.signal(known[0])} is the input; choose another output")
     return first, there[0]
 
 
@@ -546,9 +546,9 @@ class _Fit:
     def mode(self, place: int) -> Mode | None:
         """Of the two parameters from this place on; None where it is no sharp one, or at the band's edge."""
         damping, omega = self.estimate(place + 1, is_log=True), self.estimate(place, is_log=True)
-        low, high = self.inside
-        inside = low < omega.value / (2.0 * np.pi) < high
-        if not inside or damping.value > _SHARP or omega.half > _VAGUE * omega.value:
+        low, high = (2.0 * np.pi * end for end in self.inside)
+        is_inside = low < omega.interval90[0] and omega.interval90[1] < high
+        if not is_inside or damping.value > _SHARP or self.chi2 > _RESEMBLES * self.freedom:
             return None
         hertz = Estimate(omega.value / (2.0 * np.pi), tuple(end / (2.0 * np.pi) for end in omega.interval90))  # type: ignore[arg-type]
         return Mode(hertz, damping)
@@ -661,7 +661,10 @@ def _least(seen: _Spectrum, lines: NDArray[np.bool_], shape: _Shape, start: Arra
     lower, upper = np.array(bounds).T
     start = np.clip(start, lower + 1e-9, upper - 1e-9)
     scale = np.array([1.0, 1.0, 1e-3, *([0.05, 0.5] * ((start.size - 3) // 2))])
-    fit = least_squares(left, start, bounds=(lower, upper), loss="soft_l1", x_scale=scale, max_nfev=_MOST_TRIALS)
+    most, close = (_MOST_TRIALS, 1e-8) if bands else (_FIRST_TRIALS, 1e-3)
+    fit = least_squares(
+        left, start, bounds=(lower, upper), loss="soft_l1", x_scale=scale, max_nfev=most, ftol=close, xtol=close
+    )
     normal = fit.jac.T @ fit.jac
     chi2 = 2.0 * float(fit.cost) / _ALIKE_LINES
     freedom = max(2.0 * frequency.size / _ALIKE_LINES - start.size, 1.0)

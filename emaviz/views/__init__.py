@@ -86,7 +86,12 @@ class View(Generic[R]):
 
 def view_of(result: R) -> View[R]:
     """The view of a result's kind; InputError where there is none."""
+    return view_for(type(result))
+
+
+def view_for(kind: type[R]) -> View[R]:
+    """The same by the class."""
     for view in members("emaviz.views", "VIEW").values():
-        if isinstance(result, view.of):
+        if issubclass(kind, view.of):
             return view
-    raise InputError(f"a {type(result).__name__} has no view; print it instead")
+    raise InputError(f"a {kind.__name__} has no view; print it instead")

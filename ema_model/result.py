@@ -20,7 +20,7 @@ import numpy as np
 from msgspec import Meta
 
 from ema_model.errors import InputError, quoted
-from ema_model.files.written import whole_file
+from ema_model.files.written import write_text
 from ema_model.quantities.numbers import plain
 from ema_model.text import InWords, Lines
 
@@ -67,8 +67,8 @@ class Result(InWords):
         """
         target = Path(path)
         if target.suffix == ".json":
-            with whole_file(target) as draft:
-                draft.write_bytes(msgspec.json.format(msgspec.json.encode(self.to_dict()), indent=1) + b"\n")
+            text = msgspec.json.format(msgspec.json.encode(self.to_dict()), indent=1).decode()
+            write_text(target, f"{text}\n", "the result")
             return
         shows = _shows()
         if target.suffix not in shows.SUFFIXES:

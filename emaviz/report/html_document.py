@@ -16,8 +16,7 @@ from typing import Generic, TypeVar
 import plotly.graph_objects as go
 from plotly.offline import get_plotlyjs
 
-from ema_model.errors import InputError, quoted
-from ema_model.files.written import whole_file
+from ema_model.files.written import write_text
 from ema_model.text import Block, InWords, Lines, Note, Table
 from emaviz import __version__
 from emaviz.figures.theme import DARK, LIGHT
@@ -166,17 +165,7 @@ def page(title: str, lead: str, sections: Sequence[Section[Subject]], subject: S
 
 def write(path: str | Path, text: str) -> None:
     """Writes a page, whole or not at all; InputError in one line where that cannot be done."""
-    target = Path(path)
-    try:
-        if target.is_dir():
-            raise InputError(f"{quoted(target)}: is a folder; name a file in it")
-        if not target.parent.is_dir():
-            raise InputError(f"{quoted(target)}: the folder {quoted(target.parent)} does not exist; make it first")
-        with whole_file(target) as draft:
-            draft.write_text(text, encoding="utf-8", newline="\n")
-    except OSError as error:
-        why = error.strerror or type(error).__name__
-        raise InputError(f"{quoted(target)}: the report cannot be written: {why}; write it elsewhere") from None
+    write_text(path, text, "the report")
 
 
 def _figures(figures: Figures) -> str:

@@ -16,7 +16,7 @@ import numpy as np
 import plotly.graph_objects as go
 
 from ema_model.errors import InputError, quoted
-from ema_model.files.written import whole_file
+from ema_model.files.written import write_text
 from ema_model.result import Result, shown_by
 from emaviz.report import html_document as document
 from emaviz.views import Figures, Section, View, view_of
@@ -78,8 +78,7 @@ def _write_table(view: View[Any], result: Result, path: Path) -> None:
     rows = csv.writer(text, lineterminator="\n")
     rows.writerow(columns)
     rows.writerows(zip(*([_cell(one) for one in values.tolist()] for values in columns.values())))
-    with whole_file(path) as draft:
-        draft.write_text(text.getvalue(), encoding="utf-8")
+    write_text(path, text.getvalue(), "the table")
 
 
 def _cell(value: object) -> object:

@@ -12,6 +12,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
+from ema_model.errors import InputError, quoted
 from ema_model.members import stated
 
 if TYPE_CHECKING:
@@ -45,8 +46,17 @@ class Analysis:
         return self._engine.RESULT
 
     def analyse(self, recordings: Sequence[Any], actuator: Any, **options: Any) -> Result:
-        """The engine's function of that name; options: those above, and `on_progress`, which takes a text."""
+        """The engine's function of that name; options: those above, which are checked, and `on_progress`."""
+        for name in options.keys() - {"on_progress"}:
+            self.check(name, options[name])
         return self._engine.analyse(recordings, actuator, **options)
+
+    def check(self, name: str, value: object) -> None:
+        """InputError for an option that there is not, or that may not be so."""
+        if name not in self.options:
+            raise InputError(f"{self.name}: no option {quoted(name)!r}; there are {', '.join(self.options)}")
+        if value not in (choices := self.options[name].choices):
+            raise InputError(f"{self.name}: {name} must be one of {', '.join(choices)}, not {quoted(value, 40)!r}")
 
     @property
     def _engine(self) -> Any:

@@ -12,7 +12,7 @@ from typing import Any
 import msgspec
 
 from ema_model.analyses import Analysis
-from ema_model.errors import InputError, quoted
+from ema_model.errors import InputError
 from ema_model.quantities.titles import in_sentence
 from ema_model.result import Result
 from emaviz.session.compare import Comparing
@@ -60,9 +60,7 @@ class Analysing:
 
     def choose(self, name: str, value: Any) -> None:
         """One option; InputError for what it may not be."""
-        one = self.analysis.options[name]
-        if value not in one.choices:
-            raise InputError(f"{one.title} must be one of {', '.join(one.choices)}, not {quoted(value, 40)!r}")
+        self.analysis.check(name, value)
         self.chosen[name] = str(value)
 
     def begin(self) -> bool:

@@ -122,10 +122,13 @@ def test_an_input_or_output_that_is_not_there_is_one_line(tmp_path):
         ({"input": "voltage"}, "motor_voltage_V is needed"),
         ({"output": "user"}, "user_position_rad is needed"),
         ({"output": "current"}, "is the input"),
-        ({"input": "torque"}, "must be one of auto, command, current, voltage"),
+        ({"input": "torque"}, "input must be one of auto, command, current, voltage, not 'torque'"),
+        ({"inputs": "current"}, "no option 'inputs'; there are input, output"),
     ):
         with pytest.raises(InputError, match=words):
-            analyse([recording], drive, **options)
+            em.analyse("frequency", recording, drive, **options)
+    with pytest.raises(InputError, match="no analysis 'frequenzy'; there are frequency; did you mean"):
+        em.analyse("frequenzy", recording, drive)
     coarse = Measurement({name: values[::4] for name, values in recording.signals.items()}, name="coarse")
     with pytest.raises(InputError, match="several rates"):
         analyse([recording, coarse], drive)

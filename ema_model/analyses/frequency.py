@@ -19,7 +19,7 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
-from typing import Annotated
+from typing import Annotated, Any
 
 import numpy as np
 from msgspec import Meta
@@ -36,7 +36,7 @@ from ema_model.recordings import SIGNALS, Measurement
 from ema_model.result import Result
 
 Array = NDArray[np.float64]
-Complex = NDArray[np.complex128]
+Complex = NDArray[np.complexfloating[Any, Any]]
 
 # --- what is stated of it, as literals --------------------------------------------------------------------------------
 
@@ -193,7 +193,7 @@ class FrequencyResponse(Result):
         return tuple(self.sentences)
 
     @property
-    def band(self) -> Array:
+    def band(self) -> NDArray[np.bool_]:
         """(lines,) whether a frequency counts."""
         return np.array(self.counts, dtype=bool)
 
@@ -405,7 +405,7 @@ def _spectrum(pieces: tuple[Complex, Complex], size: int, step_s: float, neighbo
     frequency = middle / (size * step_s)
     return _Spectrum(
         frequency,
-        cross / np.maximum(first2, tiny),
+        np.asarray(cross / np.maximum(first2, tiny), dtype=complex),
         coherence,
         averages,
         first2 / max(float(np.max(first2, initial=0.0)), tiny),
@@ -476,7 +476,8 @@ def _looks(neighbours: int) -> tuple[Array, Array]:
     comb = np.zeros(2 * neighbours - 1)
     comb[::2] = 1.0
     weights = np.convolve(weights, comb)
-    return _SUB * (np.arange(weights.size) - 0.5 * (weights.size - 1)), weights / weights.sum()
+    places = _SUB * (np.arange(weights.size) - 0.5 * (weights.size - 1))
+    return places.astype(float), weights / float(weights.sum())
 
 
 @dataclass(frozen=True, eq=False)

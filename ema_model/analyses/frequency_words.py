@@ -60,7 +60,8 @@ def _sentences(result: FrequencyResponse, measured: Response) -> list[str]:
     """The headline first, and what both sides show beyond it."""
     first, model = headline(result), result.model
     if model is None:
-        alone = [f"The measured {kind} lies at {_hertz(mode)}" for kind in _KINDS if (mode := getattr(measured, kind))]
+        modes = (("resonance", measured.resonance), ("antiresonance", measured.antiresonance))
+        alone = [f"The measured {kind} lies at {_hertz(mode)}" for kind, mode in modes if mode is not None]
         return [first, *alone]
     alike = [line for kind in _KINDS if (line := _mode(kind, measured, model))]
     others = [*_told_apart(measured, model, result.sample_s), *alike, *_delay(measured, model, result.sample_s)]

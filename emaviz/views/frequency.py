@@ -24,7 +24,9 @@ _BAND = "rgba(47,111,222,0.18)"
 
 def magnitude(result: FrequencyResponse) -> go.Figure:
     """Measured with its 90 % band, the model's, and the functions whose resonance and delay are told."""
-    figure = _new(result, f"Magnitude, {channel_title(result)}", f"dB of {magnitude_unit(result)} [dB]")
+    shaded = ", shaded where both differ beyond the scatter" if result.differs else ""
+    figure = _new(f"Magnitude{shaded}", f"dB of {magnitude_unit(result)} [dB]")
+    theme.shade(figure, [(one.from_Hz, one.to_Hz) for one in result.differs])
     for name, side, colour, dash in _sides(result):
         if name == "measured":
             _band(figure, result.frequency_Hz, side.magnitude_dB, HALF_90 * _DECIBEL * side.sigma)
@@ -36,7 +38,7 @@ def magnitude(result: FrequencyResponse) -> go.Figure:
 
 def phase(result: FrequencyResponse) -> go.Figure:
     """Degrees, of frequencies that count."""
-    figure = _new(result, "Phase", "Phase [°]")
+    figure = _new("Phase", "Phase [°]")
     for name, side, colour, dash in _sides(result):
         if name == "measured":
             _band(figure, result.frequency_Hz, side.phase_deg, HALF_90 * np.degrees(side.sigma))
@@ -47,8 +49,8 @@ def phase(result: FrequencyResponse) -> go.Figure:
 
 
 def coherence(result: FrequencyResponse) -> go.Figure:
-    """γ², with the frequencies that do not count shaded."""
-    figure = _new(result, "Coherence", "Coherence γ² [-]")
+    """γ² of both."""
+    figure = _new("Coherence", "Coherence γ² [-]")
     for name, side, colour, dash in _sides(result):
         _add(figure, name, result.frequency_Hz, side.coherence, colour, dash)
     figure.update_yaxes(range=[0.0, 1.05])
@@ -61,12 +63,9 @@ def _sides(result: FrequencyResponse) -> Sequence[tuple[str, Response, str, str]
     return [(name, side, colour, dash) for name, side, colour, dash in both if side is not None]
 
 
-def _new(result: FrequencyResponse, title: str, y: str) -> go.Figure:
+def _new(title: str, y: str) -> go.Figure:
     figure = theme.new(title, _FREQUENCY, y)
     figure.update_xaxes(type="log")
-    if result.differs:
-        figure.update_layout(shapes=[])
-        theme.shade(figure, [(one.from_Hz, one.to_Hz) for one in result.differs])
     return figure
 
 

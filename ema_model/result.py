@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import importlib
 from collections.abc import Callable, Mapping
-from dataclasses import fields, is_dataclass
+from dataclasses import dataclass, fields, is_dataclass
 from functools import cache
 from importlib.metadata import entry_points
 from pathlib import Path
@@ -98,22 +98,44 @@ def _shows() -> Shows:
 # --- the JSON form and its schema, both of a class's types ------------------------------------------------------------
 
 
+@dataclass(frozen=True)
+class Described:
+    """A field, or a property, that is in the JSON form."""
+
+    attribute: str
+    type: Any  # with what it means
+
+
 @cache
-def described(kind: type) -> dict[str, Any]:
-    """The types of what is in the JSON form of a dataclass, by name: its fields, then its properties."""
+def described(kind: type) -> dict[str, Described]:
+    """What is in the JSON form of a dataclass, by its name there: its fields, then its properties.
+
+    That is the attribute's own name, unless `Meta(extra={"as": …})` says another.
+    """
     hints = get_type_hints(kind, include_extras=True)
-    found = {one.name: hints[one.name] for one in fields(kind)}
+    types = {one.name: hints[one.name] for one in fields(kind)}
     for base in reversed(kind.__mro__):
         for name, one in vars(base).items():
             if isinstance(one, property) and one.fget is not None:
-                found[name] = get_type_hints(one.fget, include_extras=True).get("return")
-    return {name: of for name, of in found.items() if any(isinstance(m, Meta) for m in getattr(of, "__metadata__", ()))}
+                types[name] = get_type_hints(one.fget, include_extras=True).get("return")
+    found = {}
+    for name, of in types.items():
+        said = [one for one in getattr(of, "__metadata__", ()) if isinstance(one, Meta)]
+        if said:
+            found[(said[0].extra or {}).get("as", name)] = Described(name, of)
+    return found
 
 
 @cache
-def json_type(kind: type) -> Any:
-    """A TypedDict of the JSON form of a dataclass: what its schema is made of, and what a document is held against."""
-    made = TypedDict(kind.__name__, {name: _json(of) for name, of in described(kind).items()})  # type: ignore[operator]
+def json_type(kind: type, *more: type) -> Any:
+    """A TypedDict of the JSON form of a dataclass: what its schema is made of, and what a document is held against.
+
+    more: TypedDicts of what a verb says besides.
+    """
+    types = {name: _json(one.type) for name, one in described(kind).items()}
+    for one in more:
+        types |= get_type_hints(one, include_extras=True)
+    made = TypedDict(kind.__name__, types)  # type: ignore[operator]
     made.__doc__ = (kind.__doc__ or "").strip().partition("\n")[0]
     return made
 
@@ -123,7 +145,7 @@ def _json(of: Any) -> Any:
     origin, parts = get_origin(of), get_args(of)
     if origin is Annotated:
         inner, *said = parts
-        dimensions = next((one.extra["dimensions"] for one in said if isinstance(one, Meta) and one.extra), 1)
+        dimensions = next((one.extra.get("dimensions", 1) for one in said if isinstance(one, Meta) and one.extra), 1)
         made = _rows(dimensions) if get_origin(inner) is np.ndarray else _json(inner)
         return Annotated[(made, *said)]
     if origin is np.ndarray:
@@ -147,7 +169,7 @@ def _rows(dimensions: int) -> Any:
 
 def _as_dict(value: Any) -> Any:
     if is_dataclass(value) and not isinstance(value, type):
-        return {name: _as_dict(getattr(value, name)) for name in described(type(value))}
+        return {name: _as_dict(getattr(value, one.attribute)) for name, one in described(type(value)).items()}
     if isinstance(value, Mapping):
         return {name: _as_dict(one) for name, one in value.items()}
     if isinstance(value, list | tuple):

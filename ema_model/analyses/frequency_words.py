@@ -80,12 +80,10 @@ def _told_apart(measured: Response, model: Response, sample_s: float) -> list[st
 def _mode_apart(kind: str, measured: Response, model: Response) -> str:
     """A sentence where one side has a resonance elsewhere, or has none; else ''."""
     ours, theirs = getattr(measured, kind), getattr(model, kind)
-    if ours is None and theirs is None:
-        return ""
+    if ours is None:
+        return "" if theirs is None else f"The model has {_a(kind)} at {_hertz(theirs)}; none is measured in this band"
     if theirs is None:
         return f"The measured {kind} lies at {_hertz(ours)}; the model has none in this band"
-    if ours is None:
-        return f"The model has {_a(kind)} at {_hertz(theirs)}; none is measured in this band"
     if not ours.frequency_Hz.differs(theirs.frequency_Hz):
         return ""
     return f"The measured {kind} lies at {_hertz(ours)}, the model's at {_hertz(theirs)}"

@@ -27,6 +27,9 @@ from ema_model.text import InWords, Lines
 VIEWS = "ema_model.views"  # the group of entry points of packages that show results
 
 
+NAME = {"is_name": True}  # `Meta(…, extra=NAME)`: a signal's or a parameter's name inside, or several, or keys
+
+
 class Shows(Protocol):
     """What a package offers that shows results; its entry point in the group `VIEWS` is a module with these."""
 
@@ -40,7 +43,11 @@ class Result(InWords):
 
     def to_dict(self) -> dict[str, Any]:
         """The JSON form: plain values only; a number that is not finite is None."""
-        return _as_dict(self)
+        return _as_dict(self, self.name_in_files)
+
+    def name_in_files(self, name: str) -> str:
+        """A signal or a parameter as files call it, by its name inside; asked of what is a `NAME`."""
+        return name
 
     @classmethod
     def from_dict(cls, given: Mapping[str, Any]) -> Self:
@@ -104,6 +111,7 @@ class Described:
 
     attribute: str
     type: Any  # with what it means
+    is_name: bool
 
 
 @cache
@@ -122,7 +130,8 @@ def described(kind: type) -> dict[str, Described]:
     for name, of in types.items():
         said = [one for one in getattr(of, "__metadata__", ()) if isinstance(one, Meta)]
         if said:
-            found[(said[0].extra or {}).get("as", name)] = Described(name, of)
+            extra = said[0].extra or {}
+            found[extra.get("as", name)] = Described(name, of, extra.get("is_name", False))
     return found
 
 
@@ -167,14 +176,25 @@ def _rows(dimensions: int) -> Any:
     return list[_rows(dimensions - 1)] if dimensions else float | None
 
 
-def _as_dict(value: Any) -> Any:
+def _as_dict(value: Any, in_files: Callable[[str], str]) -> Any:
     if is_dataclass(value) and not isinstance(value, type):
-        return {name: _as_dict(getattr(value, one.attribute)) for name, one in described(type(value)).items()}
+        found = {}
+        for name, one in described(type(value)).items():
+            told = _as_dict(getattr(value, one.attribute), in_files)
+            found[name] = _renamed(told, in_files) if one.is_name else told
+        return found
     if isinstance(value, Mapping):
-        return {name: _as_dict(one) for name, one in value.items()}
+        return {name: _as_dict(one, in_files) for name, one in value.items()}
     if isinstance(value, list | tuple):
-        return [_as_dict(one) for one in value]
+        return [_as_dict(one, in_files) for one in value]
     return plain(value.tolist() if isinstance(value, np.ndarray) else value)
+
+
+def _renamed(value: Any, in_files: Callable[[str], str]) -> Any:
+    """A name, several, or what is told by name."""
+    if isinstance(value, dict):
+        return {in_files(name): one for name, one in value.items()}
+    return in_files(value) if isinstance(value, str) else [in_files(name) for name in value]
 
 
 def _stored(given: Any, kind: Any) -> Any:

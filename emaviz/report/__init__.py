@@ -3,8 +3,6 @@
 from emaviz.report.comparison import write_report
 from emaviz.report.discovery import write_discovery_report
 from emaviz.report.export import write_export_report
-from emaviz.report.fleet import write_units_report
-from emaviz.report.fleet_discovery import write_units_discovery_report
 from emaviz.report.identification import write_identification_report
 
 __all__ = [
@@ -12,6 +10,4 @@ __all__ = [
     "write_export_report",
     "write_identification_report",
     "write_report",
-    "write_units_discovery_report",
-    "write_units_report",
 ]

@@ -18,6 +18,7 @@ import plotly.graph_objects as go
 from ema_model.errors import InputError, quoted
 from ema_model.files.written import write_text
 from ema_model.result import Result, shown_by
+from ema_model.text import InWords
 from emaviz.report import html_document as document
 from emaviz.views import Figures, Section, View, view_of
 
@@ -29,7 +30,7 @@ def figures(result: Result) -> list[go.Figure]:
     return view_of(result).figures(result)
 
 
-def export(result: Result, path: str | Path, configuration: Mapping[str, Any] | None = None) -> None:
+def export(result: InWords, path: str | Path, configuration: Mapping[str, Any] | None = None) -> None:
     """Writes one of `SUFFIXES`, whole or not at all; InputError, one line, where that cannot be done.
 
     configuration: the options that it was computed with, which a recording holds.
@@ -38,6 +39,8 @@ def export(result: Result, path: str | Path, configuration: Mapping[str, Any] | 
     if path.suffix == ".rrd":
         write = view.record
         if write is None:
+            if not isinstance(result, Result):
+                raise InputError(f"{quoted(path)}: a {type(result).__name__} is no recording; write it as .html")
             from emaviz.views.recording import write_recording  # rerun takes a second to import
 
             write_recording(view, result, path, configuration or {})
@@ -70,7 +73,7 @@ class _Written(document.Section[Any]):
                 yield document.pair(*placed) if len(placed) > 1 else "".join(placed)
 
 
-def _write_table(view: View[Any], result: Result, path: Path) -> None:
+def _write_table(view: View[Any], result: InWords, path: Path) -> None:
     if view.columns is None:
         raise InputError(f"{quoted(path)}: a {type(result).__name__} is no table; write it as .json")
     columns = {name: np.atleast_1d(values) for name, values in view.columns(result).items()}

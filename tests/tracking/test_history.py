@@ -79,7 +79,9 @@ def test_the_band_of_the_predicted_life_stays_within_its_axis(history, far):
     look, one = history.looks[first], history.looks[first].faults["k1"]
     left = replace(said[first], p95=far * sorted(left.p95 for left in said.values())[len(said) // 2])
     odd = History(history.thresholds)
-    odd.looks = history.looks | {first: replace(look, faults={**look.faults, "k1": replace(one, remaining_flights=left)})}
+    odd.looks = history.looks | {
+        first: replace(look, faults={**look.faults, "k1": replace(one, remaining_flights=left)})
+    }
     odd.flights = history.flights
     figure = tracking.predicted_life(odd, "k1", 100)
     low, high = figure.layout.yaxis.range

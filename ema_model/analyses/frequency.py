@@ -1,10 +1,12 @@
 """Frequency response: the measured transfer function beside the model's, with coherence, resonance and delay.
 
 By Welch's method, with half overlapping pieces under Hann's window: H₁ = S_xy/S_xx, and the coherence
-γ² = |S_xy|²/(S_xx S_yy) says how much of the output follows the input linearly.  Of n pieces the relative error of |H|,
-and that of the phase in rad, is √((1 − γ²)/(2 n γ²)) (Bendat and Piersol, Random Data, 2010, ch. 9).  The model is
-simulated on what the recordings put in, and its signals go through the same estimator: what the window and the closed
-loop do to one they do to the other.
+γ² = |S_xy|²/(S_xx S_yy) says how much of the output follows the input linearly.  Of n averages the relative error of
+|H|, and that of the phase in rad, is √((1 − γ²)/(2 n γ²)) (Bendat and Piersol, Random Data, 2010, ch. 9).  A sweep
+passes each frequency but once: of long pieces neighbouring frequencies are averaged, too, and n is (Σ P)²/Σ P² of the
+input's power P in all that is averaged, so that what holds all the power counts once.  The model is simulated on what
+the recordings put in, and its signals go through the same estimator: what the window and the closed loop do to one they
+do to the other.
 
 Resonance, antiresonance and delay are those of a rational function that is fitted to the logarithm of H:
 
@@ -216,7 +218,7 @@ def analyse(
     """
     say = on_progress or (lambda text: None)
     say("simulating the model")
-    beside = _model(recordings, actuator, input)
+    beside = _model(recordings, actuator)
     channel = _channel(beside, input, output)
     simulated = [
         {name: values[0] for name, values in beside.signals(place).items()} for place in range(len(beside.windows))
@@ -267,8 +269,8 @@ def analyse(
 # --- which signals, of which model ------------------------------------------------------------------------------------
 
 
-def _model(recordings: Sequence[Measurement], actuator: Actuator, input: str) -> ClosedLoop:
-    """The recordings beside the closed loop; or in open loop, where a current or a voltage is put in."""
+def _model(recordings: Sequence[Measurement], actuator: Actuator) -> ClosedLoop:
+    """The recordings beside the closed loop, or where no command or controller is known, beside the open one."""
     if any(one.is_map for one in recordings):
         raise InputError("a static map has no frequency response; take recordings over time")
     signals = set.intersection(*(set(one.signals) for one in recordings)) if recordings else set()
@@ -557,27 +559,29 @@ def _response(seen: _Spectrum, lines: NDArray[np.bool_], power: int) -> Response
     fit = _fitted(seen, lines, power)
     has = fit.shape
     shown = has.seen(fit.x, seen, np.ones_like(lines))
-    phase = np.full(lines.size, np.nan)
-    phase[lines] = np.unwrap(np.angle(seen.response[lines]))
-    near = np.angle(shown) + 2.0 * np.pi * np.round((np.interp(
-        seen.frequency_Hz, seen.frequency_Hz[lines], phase[lines]) - np.angle(shown)) / (2.0 * np.pi))  # fmt: skip
-    phase += 2.0 * np.pi * np.round((near - phase) / (2.0 * np.pi))
-    turns = 2.0 * np.pi * round(float(phase[lines][0]) / (2.0 * np.pi))
+    known = seen.frequency_Hz[lines]
+    measured = np.interp(seen.frequency_Hz, known, np.unwrap(np.angle(seen.response[lines])))
+    fitted = _turned_to(measured, np.angle(shown))
+    phase = np.where(lines, _turned_to(fitted, np.angle(seen.response)), np.nan)
+    first = phase[lines][0] - _turned_to(np.zeros(1), phase[lines][:1])[0]  # whole turns, that mean nothing
     with np.errstate(divide="ignore"):
-        magnitude, fitted = (20.0 * np.log10(np.abs(one)) for one in (seen.response, shown))
-    outside = ~lines
-    magnitude[outside] = np.nan
+        magnitude, of_fit = (20.0 * np.log10(np.abs(one)) for one in (seen.response, shown))
     return Response(
-        magnitude_dB=magnitude,
-        phase_deg=np.degrees(phase - turns),
+        magnitude_dB=np.where(lines, magnitude, np.nan),
+        phase_deg=np.degrees(phase - first),
         coherence=seen.coherence,
         sigma=np.where(lines, seen.sigma, np.nan),
         resonance=fit.mode(3) if has.has_resonance else None,
         antiresonance=fit.mode(5) if has.has_antiresonance else None,
         delay_s=fit.delay,
-        fitted_dB=fitted,
-        fitted_deg=np.degrees(near - turns),
+        fitted_dB=of_fit,
+        fitted_deg=np.degrees(fitted - first),
     )
+
+
+def _turned_to(near: Array, angle: Array) -> Array:
+    """Angles, rad, by as many whole turns more or less as bring them next to others."""
+    return angle + 2.0 * np.pi * np.round((near - angle) / (2.0 * np.pi))
 
 
 def _fitted(seen: _Spectrum, lines: NDArray[np.bool_], power: int) -> _Fit:

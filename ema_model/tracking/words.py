@@ -91,7 +91,9 @@ def _table(result: Tracked) -> Table:
         drift = f"{number(one.drift)}" if one.trend else "–"
         threshold = "–" if one.threshold is None else f"{one.threshold:g}"
         rows.append([_called(one.name), f"{one.level:.4f}", _interval(one.level_interval90), drift, threshold, span])
-        remarks.append(one.reason if not one.trend or one.threshold is not None else "a trend; no threshold was given")
+        remarks.append(
+            one.reason or "" if not one.trend or one.threshold is not None else "a trend; no threshold was given"
+        )
     return Table(("level", "90 % interval", "a flight", "threshold", "flights left 5, 50, 95 %"), rows, remarks=remarks)
 
 

@@ -281,7 +281,7 @@ class TrackResult:
             tracking.k_over_flights(then, name, last=last, levels=levels(history, name, number)),
             tracking.remaining_life(one.remaining_flights, came=history.came(number, name).crossed)
             if one.remaining_flights is not None
-            else tracking.none(one.reason),
+            else tracking.none(one.reason or ""),
             tracking.predicted_life(history, name, number),
         ]
         told = said(then, name, history)

@@ -24,6 +24,7 @@ def test_a_steady_drift_is_told_with_the_life_that_remains():
     assert chances == sorted(chances) and chances[0] < 0.01 and chances[-1] > 0.9
     others = [name for name, other in result.faults.items() if other.trend]
     assert others == ["k1"] and "k1 friction drifts" in str(result)
+    assert "None" not in str(result) and "None" not in result._repr_html_(), "of k1 there is no reason to say"
     document = result.to_dict()["faults"]["k1"]
     assert document["remaining_flights"]["p05"] == left.p05 and document["trend"] is True
 

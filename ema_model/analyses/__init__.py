@@ -10,6 +10,7 @@ from __future__ import annotations
 import importlib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import cache
 from typing import TYPE_CHECKING, Any
 
 from ema_model.errors import InputError, quoted
@@ -63,7 +64,8 @@ class Analysis:
         return importlib.import_module(f"{_PACKAGE}.{self.name}")
 
 
-def analyses() -> dict[str, Analysis]:
+@cache
+def analyses() -> Mapping[str, Analysis]:
     """All of them by name, in alphabetical order; what computes is not imported."""
     facts = {fact: stated(_PACKAGE, fact) for fact in ("OPTIONS", "TITLE", "HELP", "PLACE")}
     return {

@@ -560,9 +560,9 @@ def _response(seen: _Spectrum, lines: NDArray[np.bool_], power: int) -> Response
     has = fit.shape
     shown = has.seen(fit.x, seen, np.ones_like(lines))
     known = seen.frequency_Hz[lines]
-    measured = np.interp(seen.frequency_Hz, known, np.unwrap(np.angle(seen.response[lines])))
-    fitted = _turned_to(measured, np.angle(shown))
-    phase = np.where(lines, _turned_to(fitted, np.angle(seen.response)), np.nan)
+    measured = np.interp(seen.frequency_Hz, known, np.unwrap(_angle(seen.response[lines])))
+    fitted = _turned_to(measured, _angle(shown))
+    phase = np.where(lines, _turned_to(fitted, _angle(seen.response)), np.nan)
     first = phase[lines][0] - _turned_to(np.zeros(1), phase[lines][:1])[0]  # whole turns, that mean nothing
     with np.errstate(divide="ignore"):
         magnitude, of_fit = (20.0 * np.log10(np.abs(one)) for one in (seen.response, shown))
@@ -577,6 +577,10 @@ def _response(seen: _Spectrum, lines: NDArray[np.bool_], power: int) -> Response
         fitted_dB=of_fit,
         fitted_deg=np.degrees(fitted - first),
     )
+
+
+def _angle(values: Complex) -> Array:
+    return np.asarray(np.angle(values), dtype=float)
 
 
 def _turned_to(near: Array, angle: Array) -> Array:

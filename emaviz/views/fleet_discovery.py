@@ -15,9 +15,10 @@ def _of_compared(part: Any) -> Any:
     """A comparison's figures, of the comparison that is in a discovery."""
     if not isinstance(part, Figures):
         return part
-    height = part.height_px
+    drawn: Figures[Any] = part
+    height = drawn.height_px
     return Figures(
-        lambda result: part.of(result.compared),
+        lambda result: drawn.of(result.compared),
         height if isinstance(height, int) else lambda result: height(result.compared),
     )
 

@@ -31,13 +31,16 @@ def test_a_resonance_is_shown_kept_and_comes_back(page, app, tmp_path):
     app.comparing.choose_actuator("uploaded: actuators/motor.toml")
     app.comparing.add("sweep.csv")
     wait_until(lambda: "sweep.csv" in app.comparing.opened)
+    app.comparing.job.stop()  # which compares by itself what is opened
     page.get_by_role("tab", name="Bode", exact=True).click()
     page.get_by_text("What Compare has: sweep.csv").wait_for()
     choose(page, "Output", "User position")
     page.get_by_role("button", name="Frequency response").click()
+    wait_until(lambda: tab.analysing.job.error)
     page.get_by_text("user_position_rad is needed").first.wait_for()
     choose(page, "Output", "Motor position")
     page.get_by_role("button", name="Frequency response").click()
+    wait_until(lambda: tab.analysing.result is not None)
     page.get_by_text("The measured resonance lies at 38.1").first.wait_for()
     found = tab.analysing.result
     assert found is not None and found.output == "motor_position_rad"
@@ -58,6 +61,6 @@ def test_a_resonance_is_shown_kept_and_comes_back(page, app, tmp_path):
     page.get_by_role("button", name="Load session").click()
     page.get_by_text("Session loaded").wait_for()
     page.get_by_role("tab", name="Bode", exact=True).click()
-    page.get_by_text("The measured resonance lies at 38.1").first.wait_for()
+    page.get_by_text("The measured resonance lies at 38.1").locator("visible=true").first.wait_for()
     assert str(tab.analysing.result) == str(found) and tab.analysing.chosen["output"] == "motor"
     assert not tab.analysing.job.running

@@ -15,12 +15,14 @@ def _of_compared(part: Any) -> Any:
     """A comparison's figures, of the comparison that is in a discovery."""
     if not isinstance(part, Figures):
         return part
-    drawn: Figures[Any] = part
-    height = drawn.height_px
-    return Figures(
-        lambda result: drawn.of(result.compared),
-        height if isinstance(height, int) else lambda result: height(result.compared),
-    )
+
+    def drawn(result: Any) -> Any:
+        return part.of(result.compared)
+
+    def height_px(result: Any) -> int:
+        return part.height(result.compared)
+
+    return Figures(drawn, height_px)
 
 
 def _lead(result: UnitsDiscovered) -> str:

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from ema_model.api import (
         InputError,
+        analyse,
         compare,
         compare_units,
         discover,
@@ -29,6 +30,7 @@ if TYPE_CHECKING:
 
 __all__ = [
     "InputError",
+    "analyse",
     "compare",
     "compare_units",
     "discover",

@@ -22,14 +22,14 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ema_model import actuator as actuators
-from ema_model import comparison, discovery, recordings
+from ema_model import analyses, comparison, discovery, recordings
 from ema_model.actuator import Actuator
 from ema_model.commands import command as command_of
 from ema_model.comparison import Comparison
 from ema_model.discovery import Discovery
 from ema_model.discovery.begin import with_fitted_effects
 from ema_model.effects import find
-from ema_model.errors import InputError, quoted
+from ema_model.errors import InputError, did_you_mean, quoted
 from ema_model.exports import export as exporting
 from ema_model.exports.result import Export
 from ema_model.faults import vector
@@ -42,6 +42,7 @@ from ema_model.recordings import Measurement
 from ema_model.recordings.health import Health, health_of
 from ema_model.recordings.measurement import Sensors
 from ema_model.recordings.recording_set import long_enough
+from ema_model.result import Result
 from ema_model.simulation import plant
 from ema_model.simulation.run import Run
 from ema_model.tracking import track as tracking
@@ -50,6 +51,7 @@ from ema_model.tracking.result import Tracked
 
 __all__ = [
     "InputError",
+    "analyse",
     "compare",
     "compare_units",
     "discover",
@@ -66,7 +68,7 @@ __all__ = [
 One = str | os.PathLike[str] | Measurement
 Recordings = One | Sequence[One]
 Parameters = ParamSpec("Parameters")
-Result = TypeVar("Result")
+Answer = TypeVar("Answer")
 
 _FILE = "a file's name"
 _RECORDING = f"{_FILE} or a recording, as em.read gives it"
@@ -87,12 +89,12 @@ _WORDS: dict[Any, str] = {  # of types, as a message has them
 }
 
 
-def _checked(function: Callable[Parameters, Result]) -> Callable[Parameters, Result]:
+def _checked(function: Callable[Parameters, Answer]) -> Callable[Parameters, Answer]:
     """The function, which raises InputError for a value that is not of the type that it states."""
     hints, signature = get_type_hints(function), inspect.signature(function)
 
     @wraps(function)
-    def checking(*given: Parameters.args, **options: Parameters.kwargs) -> Result:
+    def checking(*given: Parameters.args, **options: Parameters.kwargs) -> Answer:
         try:
             values = signature.bind(*given, **options).arguments
         except TypeError:
@@ -216,6 +218,30 @@ def simulate(
     hidden = {name: find(name).settings(dict(given)) for name, given in (effects or {}).items()}
     clean = plant.simulate(run, actuator or load_actuator(), vector(dict(faults or {})), hidden)
     return replace(Sensors(noise_A, encoder_bits).record(clean, seed), name=command)
+
+
+@_checked
+def analyse(
+    name: str,
+    of: Recordings,
+    actuator: Actuator | None = None,
+    *,
+    on_progress: Callable[[str], None] | None = None,
+    **options: str,
+) -> Result:
+    """An analysis of recordings of one actuator beside its model; the answer says, shows and exports itself.
+
+    name: of the analysis: "frequency".
+    of: files' names or recordings, one or several, taken together.
+    actuator: what was recorded; the thesis's without one.
+    on_progress: takes a text that says what goes on; what it raises ends the analysis.
+    options: the analysis's own, as `emaviz NAME --help` lists them, such as input="current".
+    """
+    known = analyses.analyses()
+    if name not in known:
+        raise InputError(f"no analysis {quoted(name)!r}; there are {', '.join(known)}{did_you_mean(name, known)}")
+    actuator = actuator or load_actuator()
+    return known[name].analyse(_read(of, actuator), actuator, **options, on_progress=on_progress)
 
 
 @_checked

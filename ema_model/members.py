@@ -9,6 +9,7 @@ import ast
 import importlib
 import pkgutil
 from collections.abc import Iterator
+from functools import lru_cache
 from pathlib import Path
 from types import ModuleType
 from typing import Any, TypeVar
@@ -30,8 +31,7 @@ def stated(package: str, fact: str) -> dict[str, Any]:
     """
     found = {}
     for path in sorted(path for place in _places(package) for path in place.glob("[!_]*.py")):
-        source = path.read_text(encoding="utf-8")
-        if fact in source and (values := list(_assigned(ast.parse(source), fact))):
+        if fact in (source := _source(path)) and (values := list(_assigned(_parsed(source), fact))):
             found[path.stem] = values[0]
     return found
 
@@ -40,13 +40,22 @@ def stated_in(module: str, fact: str) -> Any:
     """The same of one file: the literal that it assigns to this name."""
     package, _, name = module.rpartition(".")
     (path,) = (place / f"{name}.py" for place in _places(package))
-    return next(_assigned(ast.parse(path.read_text(encoding="utf-8")), fact))
+    return next(_assigned(_parsed(_source(path)), fact))
 
 
 def _places(package: str) -> list[Path]:
     top, *folders = package.split(".")
     # Only the top is imported, which holds nothing: a package below may take a second.
     return [Path(place, *folders) for place in importlib.import_module(top).__path__]
+
+
+def _source(path: Path) -> str:
+    return path.read_text(encoding="utf-8")
+
+
+@lru_cache(maxsize=8)  # several facts of a file are asked for one after another
+def _parsed(source: str) -> ast.Module:
+    return ast.parse(source)
 
 
 def _assigned(body: ast.Module | ast.ClassDef, fact: str) -> Iterator[Any]:

@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from html import escape
 from importlib import import_module
+from importlib.util import find_spec
 from typing import Literal
 
 # --- what a result says, as data --------------------------------------------------------------------------------------
@@ -187,7 +188,8 @@ class Document:
 class InWords:
     """A result that shows itself: as text when it is printed, as HTML in a notebook.
 
-    What it says is `document_of(result)`, in the result's own file or in `words.py` beside it.
+    What it says is `document_of(result)`, in the result's own file, in the one of that name with `_words`, or in
+    `words.py` beside it.
     """
 
     @property
@@ -195,7 +197,8 @@ class InWords:
         """What it says."""
         own = import_module(type(self).__module__)
         if not hasattr(own, "document_of"):
-            own = import_module(f"{own.__name__.rpartition('.')[0]}.words")
+            beside = f"{own.__name__}_words"
+            own = import_module(beside if find_spec(beside) else f"{own.__name__.rpartition('.')[0]}.words")
         return own.document_of(self)
 
     def __str__(self) -> str:

@@ -1,4 +1,4 @@
-"""Adding a member of a family is adding one file: a copy of the program, one new file in each family, nothing else."""
+"""Adding a member of a family is adding one file, a new analysis is four: a copy of the program with these, no more."""
 
 from __future__ import annotations
 
@@ -148,6 +148,121 @@ class NotesTab(Tab):
         self.note = self.page.server.gui.add_text("Note", "")
 ''',
 }
+ANALYSIS = {
+    "ema_model/analyses/levels.py": '''
+"""Levels: the rms of a signal in each recording."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Annotated
+
+import numpy as np
+from msgspec import Meta
+from numpy.typing import NDArray
+
+from ema_model.result import Result
+
+TITLE = "Levels"
+HELP = "show how large a signal is"
+PLACE = 98
+OPTIONS = {
+    "signal": {"title": "Signal", "help": "of which", "choices": {"current_A": "Current", "command_rad": "Command"}}
+}
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Levels(Result):
+    """The rms of a signal in each recording."""
+
+    names: Annotated[tuple[str, ...], Meta(description="of the recordings")]
+    rms: Annotated[NDArray[np.float64], Meta(description="in the signal's unit")]
+
+    @property
+    def answer(self) -> Annotated[tuple[str, ...], Meta(description="in sentences")]:
+        return tuple(self.sentences)
+
+
+RESULT = Levels
+
+
+def analyse(recordings, actuator, *, signal="current_A", on_progress=None):
+    rms = [np.sqrt(np.mean(one[signal] ** 2)) for one in recordings]
+    return Levels(tuple(one.name for one in recordings), np.array(rms))
+''',
+    "ema_model/analyses/levels_words.py": '''
+"""What levels say."""
+
+from __future__ import annotations
+
+from ema_model.text import Document, Lines
+
+
+def headline(result):
+    return f"The largest level is {result.rms.max():.3g}"
+
+
+def document_of(result):
+    return Document([Lines([headline(result)])])
+''',
+    "emaviz/views/levels.py": '''
+"""Levels as a line over the recordings."""
+
+from __future__ import annotations
+
+import plotly.graph_objects as go
+
+from ema_model.analyses.levels import Levels
+from ema_model.analyses.levels_words import headline
+from emaviz.views import ANSWER, Figures, Section, View
+
+
+def _drawn(result):
+    x = list(range(1, len(result.rms) + 1))
+    return [[go.Figure(go.Scatter(x=x, y=result.rms, line={"color": "#2f6fde"}), layout={"title": {"text": "rms"}})]]
+
+
+VIEW = View(
+    of=Levels,
+    name="levels",
+    title=headline,
+    lead=lambda result: ", ".join(result.names),
+    sections=(ANSWER, Section("Levels", "levels", (Figures(_drawn),))),
+    meaning=lambda result: "good",
+    columns=lambda result: {"recording": result.names, "rms": result.rms},
+)
+''',
+    "emaviz/page/levels.py": '''
+"""The Levels tab."""
+
+from __future__ import annotations
+
+import viser
+
+from emaviz.page.analysis import AnalysisTab
+from emaviz.page.workspaces import Workspace
+
+WORKSPACE = Workspace("levels", "Levels", viser.Icon.RULER, 98)
+
+
+class LevelsTab(AnalysisTab):
+    """Of Compare's recordings."""
+
+    workspace = WORKSPACE
+    analysis = "levels"
+    about = "How large a signal is."
+    steps = ("Press Levels.",)
+''',
+}
+SHOWN = """
+import json
+import ema_model as em
+found = em.analyse("levels", ["run.csv", "run.csv"], signal="command_rad")
+print(found, len(found.figures()), "The largest" in found._repr_html_(), sorted(found.to_dict()))
+found.export("levels.csv")
+print(open("levels.csv").read().count("run"))
+print([key for key in json.load(open("l.json")) if key in ("names", "rms", "answer")])
+"""
 PAGE = """
 from pathlib import Path
 from emaviz.page.app import App
@@ -168,7 +283,7 @@ def copied(tmp_path_factory):
     folder = tmp_path_factory.mktemp("members")
     for package in ("ema_model", "emaviz"):
         shutil.copytree(PROJECT / package, folder / package, ignore=shutil.ignore_patterns("__pycache__"))
-    for path, text in NEW.items():
+    for path, text in (NEW | ANALYSIS).items():
         (folder / path).parent.mkdir(exist_ok=True)
         (folder / path).write_text(text.lstrip())
     (folder / "assets").symlink_to(PROJECT / "assets")
@@ -222,4 +337,19 @@ def test_an_optimiser(copied):
 
 @pytest.mark.long
 def test_a_tab(copied):
-    assert copied("-c", PAGE).count("'Runs', 'Notes']") == 1
+    assert copied("-c", PAGE).count("'Runs', 'Levels', 'Notes']") == 1
+
+
+def test_an_analysis_is_four_files(copied):
+    """Verb, help, schema, JSON, report, recording, table and the form in a notebook follow by themselves."""
+    assert len(ANALYSIS) == 4
+    copied("-m", "emaviz", "simulate", "--model", "mm", "--duration", "0.1", "--out", "run.csv")
+    told = copied("-m", "emaviz", "levels", "run.csv", "--json", "l.json", "--report", "l.html", "--record", "l.rrd")
+    assert told.startswith("The largest level is ")
+    assert "<h2>Levels</h2>" in (copied.folder / "l.html").read_text()
+    assert (copied.folder / "l.rrd").stat().st_size > 1000
+    assert "show how large a signal is" in copied("-m", "emaviz", "--help")
+    assert "in the signal's unit" in copied("-m", "emaviz", "schema", "levels")
+    said, rows, keys = copied("-c", SHOWN).splitlines()
+    assert said.startswith("The largest level is ") and said.endswith("1 True ['answer', 'names', 'rms']")
+    assert (rows, keys) == ("2", "['names', 'rms', 'answer']")

@@ -148,6 +148,7 @@ LONG = (
     "--by unit",
     "overhaul",
     "challenge one_life",
+    "frequency sweep",
     "track",
     "campaign",
     "reproduce",

@@ -18,7 +18,7 @@ from tomlkit.container import Container
 from tomlkit.exceptions import TOMLKitError
 from tomlkit.items import InlineTable, Null, Table
 
-from ema_model.errors import InputError
+from ema_model.errors import InputError, quoted
 from ema_model.files.opened import open_user_file
 
 # --- a file lock that dies with its process: tells a recording being written from one left behind ---------------------
@@ -102,6 +102,24 @@ def whole_file(path: str | os.PathLike[str]) -> Iterator[Path]:
             draft.unlink(missing_ok=True)
         if lock is not None:
             lock.release()
+
+
+def write_text(path: str | os.PathLike[str], text: str, what: str) -> None:
+    """Writes a text file, whole or not at all; InputError in one line where that cannot be done.
+
+    what: it is, as 'the report'.
+    """
+    target = Path(path)
+    try:
+        if target.is_dir():
+            raise InputError(f"{quoted(target)}: is a folder; name a file in it")
+        if not target.parent.is_dir():
+            raise InputError(f"{quoted(target)}: the folder {quoted(target.parent)} does not exist; make it first")
+        with whole_file(target) as draft:
+            draft.write_text(text, encoding="utf-8", newline="\n")
+    except OSError as error:
+        why = error.strerror or type(error).__name__
+        raise InputError(f"{quoted(target)}: {what} cannot be written: {why}; write it elsewhere") from None
 
 
 def change_file(path: str | os.PathLike[str], change: Callable[[str], str], most_bytes: int) -> None:

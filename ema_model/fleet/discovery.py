@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Annotated, TypedDict
+from typing import TYPE_CHECKING, Annotated, Any, TypedDict
 
 from msgspec import Meta
 
@@ -15,14 +15,14 @@ from ema_model.discovery import Added, Discovery, discover
 from ema_model.discovery import as_dict as of_discovery
 from ema_model.discovery.words import DiscoveryJson, effect_title
 from ema_model.fleet.compare import check_units, compare_units
-from ema_model.fleet.result import UnitsCompared, UnitsComparedJson, and_so_on, notes, rests_on
-from ema_model.fleet.result import as_dict as of_compared
+from ema_model.fleet.result import UnitsCompared, and_so_on, notes, rests_on
 from ema_model.fleet.result import document_of as document_of_compared
 from ema_model.fleet.result import sentences as of_differences
 from ema_model.quantities.axes import Axes
 from ema_model.quantities.numbers import number
 from ema_model.quantities.titles import in_sentence
 from ema_model.recordings import Measurement
+from ema_model.result import json_type
 from ema_model.text import Block, Document, InWords, Lines, Note, Table
 
 # --- looks for the physics that units lack: unit by unit, and in each again for what others lack ----------------------
@@ -251,6 +251,12 @@ def _table(result: UnitsDiscovered) -> Table:
 # --- the JSON form of the physics that units lack: what each field means, and where it is from ------------------------
 
 
+if TYPE_CHECKING:
+    UnitsComparedJson = dict[str, Any]
+else:
+    UnitsComparedJson = json_type(UnitsCompared)  # of its fields
+
+
 class LackOfUnitJson(TypedDict):
     """An effect as one unit's recordings tell it; errors are rms pooled over signals, in floors."""
 
@@ -300,7 +306,7 @@ def as_dict(result: UnitsDiscovered) -> UnitsDiscoveredJson:
         "unexplained": list(result.unexplained),
         "undecided": list(result.undecided),
         "discoveries": {unit: of_discovery(one) for unit, one in result.discoveries.items()},
-        "compared": of_compared(result.compared),
+        "compared": result.compared.to_dict(),
     }
 
 

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import asdict, dataclass
-from typing import Annotated, TypedDict
+from dataclasses import dataclass
+from typing import Annotated, Any
 
 import numpy as np
 from msgspec import Meta
@@ -14,9 +14,10 @@ from ema_model.actuator import Actuator
 from ema_model.actuator.parameters import on_axes
 from ema_model.fleet.criteria import MISFIT
 from ema_model.quantities.axes import of_signal
-from ema_model.quantities.numbers import HALF_90, IntervalJson, amount, number, with_uncertainty
+from ema_model.quantities.numbers import HALF_90, amount, number, with_uncertainty
 from ema_model.quantities.titles import in_sentence
-from ema_model.text import Block, Document, InWords, Lines, Note, Table
+from ema_model.result import NAME, Result
+from ema_model.text import Block, Document, Lines, Note, Table
 
 # --- what was found in comparing units --------------------------------------------------------------------------------
 # What was found in comparing units: in what which of them differ, how they are of a type, which model suits which.
@@ -25,19 +26,24 @@ Array = NDArray[np.float64]
 Interval = tuple[float, float]
 
 
+def _as(name: str, description: str, **more: Any) -> Meta:
+    """What a field means that has another name in the JSON form."""
+    return Meta(description=description, extra={"as": name, **more})
+
+
 @dataclass(frozen=True)
 class Difference:
     """A parameter in which one unit is not as the others; every interval holds 90 %."""
 
-    unit: str
-    parameter: str  # "section.parameter"
-    alike: tuple[str, ...]  # other parameters of the unit that would tell it as well
-    change: float  # from what the others share, in the parameter's unit
-    change90: Interval
-    share: float | None  # the change over what the others share; None where that is 0
-    share90: Interval | None
-    evidence: float  # of −2 log likelihood, by which sharing it is worse
-    held_out: float | None  # the same on recordings that were not fitted; None without any
+    unit: Annotated[str, Meta(description="its name")]
+    parameter: Annotated[str, Meta(description="section.name, as the actuator's file calls it", extra=NAME)]
+    alike: Annotated[tuple[str, ...], _as("same_as", "other parameters of the unit that would tell it as well", **NAME)]
+    change: Annotated[float, Meta(description="from what the others share, in the unit that ends the name")]
+    change90: Annotated[Interval, _as("interval90", "the ends of the 90 % interval about change")]
+    share: Annotated[float | None, Meta(description="the change over what the others share; null: that is 0")]
+    share90: Annotated[Interval | None, _as("share_interval90", "the ends of the 90 % interval about share")]
+    evidence: Annotated[float, Meta(description="of −2 log likelihood, by which a shared value is worse")]
+    held_out: Annotated[float | None, _as("held_out_evidence", "the same on what was not fitted; null: nothing was")]
 
     @property
     def together(self) -> tuple[str, ...]:
@@ -47,27 +53,29 @@ class Difference:
 
 @dataclass(frozen=True)
 class OfType:
-    """A parameter of the type."""
+    """A parameter of the type, in its `unit`."""
 
-    mean: float
-    mean90: Interval
-    scatter: float  # 1 σ over units, in the parameter's unit; 0 where all share it
-    sigma: float  # 1 σ of a further unit: scatter and what is not known of the mean
-    unit: str
-    told: bool  # whether the recordings tell it at all: else it is as the file says
+    mean: Annotated[float, Meta(description="over the units")]
+    mean90: Annotated[Interval, Meta(description="the ends of the 90 % interval about mean")]
+    scatter: Annotated[float, Meta(description="1 σ over units; 0 where all share the value")]
+    sigma: Annotated[float, Meta(description="1 σ of a further unit: scatter, and what is not known of the mean")]
+    unit: Annotated[str, Meta(description="of measurement; empty for a ratio")]
+    told: Annotated[bool, Meta(description="whether the recordings tell it; else it is as the file says")]
 
 
 @dataclass(frozen=True)
 class OfRecording:
     """In what one recording disagrees with the others of its unit: freed for it, and no difference between units."""
 
-    unit: str
-    recording: str
-    quantity: str  # "current_zero", "current_delay" or "winding_temperature"
-    value: float
-    value90: Interval
-    in_unit: str  # "A", "s" or "K"
-    allowed_for: bool  # else nothing is told of what the unit differs in
+    unit: Annotated[str, Meta(description="the unit's name")]
+    recording: Annotated[str, Meta(description="the recording's name")]
+    quantity: Annotated[str, Meta(description="current_zero, current_delay or winding_temperature")]
+    value: Annotated[float, Meta(description="by how much, in the unit that `in` says")]
+    value90: Annotated[Interval, _as("interval90", "the ends of the 90 % interval about value")]
+    in_unit: Annotated[str, _as("in", "the unit of measurement: A, s or K")]
+    allowed_for: Annotated[
+        bool, Meta(description="whether the fit allows for it; else the unit's differences are open")
+    ]
 
 
 @dataclass(frozen=True, eq=False)
@@ -85,41 +93,78 @@ class Alone:
 
 @dataclass(frozen=True, eq=False)
 class Transfer:
-    """Each unit's own model on each unit's recordings."""
+    """Each unit's own model on each unit's recordings; rows and columns are in the order of `units`."""
 
-    signal: str
-    error: Array  # (model of, recordings of), rms in the signal's unit
-    floor: Array  # (recordings of,), rms
-    floors: Array  # (model of, recordings of): all signals' error in floors
+    signal: Annotated[str, Meta(description="that rmse and noise_floor are of, and whose unit they have", extra=NAME)]
+    error: Annotated[Array, _as("rmse", "rows: the model of, columns: the recordings of", dimensions=2)]
+    floor: Annotated[Array, _as("noise_floor", "rms that a perfect model would leave of the recordings of")]
+    floors: Annotated[
+        Array, Meta(description="the error of all signals in floors, as rmse is ordered", extra={"dimensions": 2})
+    ]
 
 
 @dataclass(frozen=True)
 class Need:
     """A parameter that a unit's recordings do not tell."""
 
-    unit: str
-    parameter: str
+    unit: Annotated[str, Meta(description="the unit's name")]
+    parameter: Annotated[str, Meta(description="section.name", extra=NAME)]
     recording: str  # of another unit, which tells it there; empty where no unit's recordings do
+
+    @property
+    def like(self) -> Annotated[str | None, Meta(description="a recording of another unit that tells it; null: none")]:
+        """That recording."""
+        return self.recording or None
+
+
+@dataclass(frozen=True)
+class UnitParameter:
+    """A parameter of one unit, as its own recordings tell it."""
+
+    value: Annotated[float, Meta(description="in `unit`")]
+    interval90: Annotated[Interval, Meta(description="the ends of the 90 % interval about value")]
+    unit: Annotated[str, Meta(description="of measurement; empty for a ratio")]
+
+
+@dataclass(frozen=True)
+class Unit:
+    """One unit of the type."""
+
+    name: Annotated[str, Meta(description="its folder, number or --unit name")]
+    recordings: Annotated[tuple[str, ...], Meta(description="names of those that were fitted")]
+    holdout: Annotated[tuple[str, ...], Meta(description="names of those that were not fitted")]
+    error: Annotated[float, Meta(description="rms error of its own model pooled over signals, in floors")]
+    parameters: Annotated[dict[str, UnitParameter], Meta(description="by section.name", extra=NAME)]
 
 
 @dataclass(frozen=True, repr=False, eq=False)
-class UnitsCompared(InWords):
-    """The answer."""
+class UnitsCompared(Result):
+    """What units of one type differ in (with --by or --unit)."""
 
     actuator: Actuator  # as its file says
     units: tuple[str, ...]
     recordings: tuple[tuple[str, ...], ...]  # names, fitted, of each unit
     held_out: tuple[tuple[str, ...], ...]
-    differences: tuple[Difference, ...]
-    dropped: tuple[Difference, ...]  # that held-out recordings contradict
-    of_recordings: tuple[OfRecording, ...]
-    of_type: dict[str, OfType]
+    differences: Annotated[tuple[Difference, ...], Meta(description="in which units are not as the others")]
+    dropped: Annotated[tuple[Difference, ...], _as("contradicted", "differences that held-out recordings contradict")]
+    of_recordings: Annotated[tuple[OfRecording, ...], Meta(description="what is of one recording, and of no unit")]
+    of_type: Annotated[dict[str, OfType], _as("type", "what the units have in common, by section.name", **NAME)]
     alone: dict[str, Alone]  # by parameter, as `of_type`
-    transfer: Transfer
-    needs: tuple[Need, ...]
+    transfer: Annotated[Transfer, Meta(description="which model suits which unit")]
+    needs: Annotated[tuple[Need, ...], _as("needed", "what the recordings do not tell, and which would")]
     errors: Array  # (units,), of each unit's own model, in floors
     type_actuator: Actuator  # with the type's values and tolerances
-    warnings: tuple[str, ...]
+    warnings: Annotated[tuple[str, ...], Meta(description="what the answer must be read with")]
+
+    def name_in_files(self, name: str) -> str:
+        """A signal's, or a parameter's path."""
+        axes = self.actuator.axes
+        return on_axes(name, axes).path if "." in name else axes.signal(name)
+
+    @property
+    def answer(self) -> Annotated[list[str], _as("sentences", "the answer in words, the first one first")]:
+        """What differs, and what scatters."""
+        return sentences(self)
 
     @property
     def is_missed(self) -> bool:
@@ -127,179 +172,23 @@ class UnitsCompared(InWords):
         return bool(np.any(self.errors > MISFIT))
 
     @property
-    def scattering(self) -> list[str]:
-        """Parameters that scatter over all units."""
+    def scattering(
+        self,
+    ) -> Annotated[list[str], Meta(description="parameters that scatter over all units, section.name", extra=NAME)]:
+        """By their paths."""
         return [path for path, one in self.of_type.items() if one.scatter > 0.0]
 
+    @property
+    def each(self) -> Annotated[list[Unit], _as("units", "each as its own recordings tell it")]:
+        """By unit, what stands elsewhere by what it is."""
+        return [self._unit(place, name) for place, name in enumerate(self.units)]
 
-# --- the JSON form of what units differ in: what each field means, and where it is from -------------------------------
-
-
-class DifferenceJson(TypedDict):
-    """A parameter in which one unit is not as the others."""
-
-    unit: Annotated[str, Meta(description="its name")]
-    parameter: Annotated[str, Meta(description="section.name, as the actuator's file calls it")]
-    same_as: Annotated[list[str], Meta(description="other parameters of the unit that would tell it as well")]
-    change: Annotated[float, Meta(description="from what the others share, in the unit that ends the name")]
-    interval90: Annotated[IntervalJson, Meta(description="the ends of the 90 % interval about change")]
-    share: Annotated[float | None, Meta(description="the change over what the others share; null: that is 0")]
-    share_interval90: Annotated[IntervalJson | None, Meta(description="the ends of the 90 % interval about share")]
-    evidence: Annotated[float, Meta(description="of −2 log likelihood, by which a shared value is worse")]
-    held_out_evidence: Annotated[float | None, Meta(description="the same on what was not fitted; null: nothing was")]
-
-
-class UnitParameterJson(TypedDict):
-    """A parameter of one unit, as its own recordings tell it."""
-
-    value: Annotated[float, Meta(description="in `unit`")]
-    interval90: Annotated[IntervalJson, Meta(description="the ends of the 90 % interval about value")]
-    unit: Annotated[str, Meta(description="of measurement; empty for a ratio")]
-
-
-class UnitJson(TypedDict):
-    """One unit of the type."""
-
-    name: Annotated[str, Meta(description="its folder, number or --unit name")]
-    recordings: Annotated[list[str], Meta(description="names of those that were fitted")]
-    holdout: Annotated[list[str], Meta(description="names of those that were not fitted")]
-    error: Annotated[float, Meta(description="rms error of its own model pooled over signals, in floors")]
-    parameters: Annotated[dict[str, UnitParameterJson], Meta(description="by section.name")]
-
-
-_In = TypedDict("_In", {"in": Annotated[str, Meta(description="the unit of measurement: A, s or K")]})
-
-
-class OfRecordingJson(_In):
-    """In what one recording disagrees with the others of its unit."""
-
-    unit: Annotated[str, Meta(description="the unit's name")]
-    recording: Annotated[str, Meta(description="the recording's name")]
-    quantity: Annotated[str, Meta(description="current_zero, current_delay or winding_temperature")]
-    value: Annotated[float, Meta(description="by how much, in the unit that `in` says")]
-    interval90: Annotated[IntervalJson, Meta(description="the ends of the 90 % interval about value")]
-    allowed_for: Annotated[
-        bool, Meta(description="whether the fit allows for it; else the unit's differences are open")
-    ]
-
-
-class OfTypeJson(TypedDict):
-    """A parameter of the type, in its `unit`."""
-
-    mean: Annotated[float, Meta(description="over the units")]
-    mean90: Annotated[IntervalJson, Meta(description="the ends of the 90 % interval about mean")]
-    scatter: Annotated[float, Meta(description="1 σ over units; 0 where all share the value")]
-    sigma: Annotated[float, Meta(description="1 σ of a further unit: scatter, and what is not known of the mean")]
-    unit: Annotated[str, Meta(description="of measurement; empty for a ratio")]
-    told: Annotated[bool, Meta(description="whether the recordings tell it; else it is as the file says")]
-
-
-class TransferJson(TypedDict):
-    """Each unit's model on each unit's recordings; rows and columns are in the order of `units`."""
-
-    signal: Annotated[str, Meta(description="that rmse and noise_floor are of, and whose unit they have")]
-    rmse: Annotated[list[list[float]], Meta(description="rows: the model of, columns: the recordings of")]
-    noise_floor: Annotated[list[float], Meta(description="rms that a perfect model would leave of the recordings of")]
-    floors: Annotated[list[list[float]], Meta(description="the error of all signals in floors, as rmse is ordered")]
-
-
-class NeedJson(TypedDict):
-    """A parameter that a unit's recordings do not tell."""
-
-    unit: Annotated[str, Meta(description="the unit's name")]
-    parameter: Annotated[str, Meta(description="section.name")]
-    like: Annotated[str | None, Meta(description="a recording of another unit that tells it there; null: none does")]
-
-
-class UnitsComparedJson(TypedDict):
-    """What units of one type differ in (with --by or --unit)."""
-
-    sentences: Annotated[list[str], Meta(description="the answer in words, the first one first")]
-    warnings: Annotated[list[str], Meta(description="what the answer must be read with")]
-    units: Annotated[list[UnitJson], Meta(description="each as its own recordings tell it")]
-    differences: Annotated[list[DifferenceJson], Meta(description="in which units are not as the others")]
-    contradicted: Annotated[list[DifferenceJson], Meta(description="differences that held-out recordings contradict")]
-    of_recordings: Annotated[list[OfRecordingJson], Meta(description="what is of one recording, and of no unit")]
-    scattering: Annotated[list[str], Meta(description="parameters that scatter over all units, section.name")]
-    type: Annotated[dict[str, OfTypeJson], Meta(description="what the units have in common, by section.name")]
-    transfer: Annotated[TransferJson, Meta(description="which model suits which unit")]
-    needed: Annotated[list[NeedJson], Meta(description="what the recordings do not tell, and which would")]
-
-
-def as_dict(result: UnitsCompared) -> UnitsComparedJson:
-    """Plain values only; parameters as the actuator's file calls them."""
-
-    def shown(path: str) -> str:
-        return on_axes(path, result.actuator.axes).path
-
-    def difference(one: Difference) -> DifferenceJson:
-        return {
-            "unit": one.unit,
-            "parameter": shown(one.parameter),
-            "same_as": [shown(path) for path in one.alike],
-            "change": one.change,
-            "interval90": list(one.change90),
-            "share": one.share,
-            "share_interval90": None if one.share90 is None else list(one.share90),
-            "evidence": one.evidence,
-            "held_out_evidence": one.held_out,
+    def _unit(self, place: int, name: str) -> Unit:
+        parameters = {
+            path: UnitParameter(float(one.value[place]), one.interval90(place), self.of_type[path].unit)
+            for path, one in self.alone.items()
         }
-
-    def alone(unit: int) -> dict[str, UnitParameterJson]:
-        return {
-            shown(path): {
-                "value": float(one.value[unit]),
-                "interval90": list(one.interval90(unit)),
-                "unit": result.of_type[path].unit,
-            }
-            for path, one in result.alone.items()
-        }
-
-    moved = result.transfer
-    return {
-        "sentences": sentences(result),
-        "warnings": list(result.warnings),
-        "units": [
-            {
-                "name": name,
-                "recordings": list(result.recordings[i]),
-                "holdout": list(result.held_out[i]),
-                "error": float(result.errors[i]),
-                "parameters": alone(i),
-            }
-            for i, name in enumerate(result.units)
-        ],
-        "differences": [difference(one) for one in result.differences],
-        "contradicted": [difference(one) for one in result.dropped],
-        "of_recordings": [_summary_of_recording(one) for one in result.of_recordings],
-        "scattering": [shown(path) for path in result.scattering],
-        "type": {shown(path): _of_type(one) for path, one in result.of_type.items()},
-        "transfer": {
-            "signal": result.actuator.axes.signal(moved.signal),
-            "rmse": moved.error.tolist(),
-            "noise_floor": moved.floor.tolist(),
-            "floors": moved.floors.tolist(),
-        },
-        "needed": [
-            {"unit": one.unit, "parameter": shown(one.parameter), "like": one.recording or None} for one in result.needs
-        ],
-    }
-
-
-def _summary_of_recording(one: OfRecording) -> OfRecordingJson:
-    return {
-        "unit": one.unit,
-        "recording": one.recording,
-        "quantity": one.quantity,
-        "value": one.value,
-        "interval90": list(one.value90),
-        "in": one.in_unit,
-        "allowed_for": one.allowed_for,
-    }
-
-
-def _of_type(one: OfType) -> OfTypeJson:
-    return OfTypeJson(**{**asdict(one), "mean90": list(one.mean90)})
+        return Unit(name, self.recordings[place], self.held_out[place], float(self.errors[place]), parameters)
 
 
 # --- what units differ in, in words -----------------------------------------------------------------------------------

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
+from msgspec import Meta
 from numpy.typing import NDArray
 from scipy.special import log_ndtr, ndtr, ndtri
 
@@ -138,19 +140,27 @@ _MORE = 4  # times as many are drawn as are kept
 _LEAST_RATE = 1e-5  # of k in a flight; what wears less is not told from what wears nothing
 
 
+@dataclass(frozen=True)
+class Crossing:
+    """How likely k crosses its threshold soon."""
+
+    flights: Annotated[int, Meta(description="within so many from the last one on")]
+    probability: Annotated[float, Meta(description="0 … 1")]
+
+
 @dataclass(frozen=True, eq=False)
 class Remaining:
-    """Flights that remain, from now on."""
+    """Flights until k first crosses its threshold, from the last flight on."""
 
-    p05: float
-    p50: float
-    p95: float
+    p05: Annotated[float, Meta(description="flights; 5 % of such units cross earlier")]
+    p50: Annotated[float, Meta(description="flights; half of such units cross earlier")]
+    p95: Annotated[float, Meta(description="flights; 95 % of such units cross earlier")]
     samples: Array  # sorted, of the distribution
 
     @property
-    def crossing(self) -> tuple[tuple[int, float], ...]:
-        """Within so many flights, with which probability."""
-        return tuple((flights, self.within(flights)) for flights in AHEAD)
+    def crossing(self) -> tuple[Crossing, ...]:
+        """Of several numbers of flights."""
+        return tuple(Crossing(flights, self.within(flights)) for flights in AHEAD)
 
     def within(self, flights: float) -> float:
         """The probability of crossing within the next flights."""

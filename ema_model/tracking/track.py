@@ -15,7 +15,7 @@ from ema_model.quantities.numbers import HALF_90, check_number
 from ema_model.tracking.evidence import LEAST_FLIGHTS, LONGEST, MISFIT_SHARE, MISFIT_WINDOW, WORN_BEFORE
 from ema_model.tracking.flights import Flight
 from ema_model.tracking.remaining import Wear, remaining, wear
-from ema_model.tracking.result import FaultTrack, Jump, Tracked
+from ema_model.tracking.result import FaultTrack, Jump, LeftOut, Tracked
 from ema_model.tracking.series import Series
 
 Array = NDArray[np.float64]
@@ -143,22 +143,23 @@ class Tracker:
         sigma = float(np.sqrt(sigma**2 + unit[1, 1]))
         low, high = (float(np.clip(level + z * sigma, 0.0, 1.0)) for z in (-HALF_90, HALF_90))
         seen = known.trend_at[lead]
-        since = "" if seen is None else self._usable[seen].name
+        since = None if seen is None else self._usable[seen].name
         return FaultTrack(
             name=name,
             trend=trend,
             level=float(np.clip(level, 0.0, 1.0)),
-            level90=(low, high),
+            level_interval90=(low, high),
             drift=drift,
-            drift90=drift90,
+            drift_interval90=drift90,
             since=since,
             threshold=threshold,
-            remaining=left,
-            reason=reason,
+            remaining_flights=left,
+            reason=reason or None,
             jumps=self._jumps(name, known),
-            evidence=float(known.log_evidence[lead]),
+            log_evidence=float(known.log_evidence[lead]),
             k=k,
             sigma=np.sqrt(factor * own),
+            excluded=tuple(LeftOut(one.name, one.excluded) for one in self._flights if one.excluded),
         )
 
     def _left(self, name: str, worn: Wear, threshold: float, unit: Array, drift: float, sign: float):

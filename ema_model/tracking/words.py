@@ -55,7 +55,7 @@ def hindsight(then: FaultTrack, came: Came) -> str:
     if then.threshold is None or not came.seen:
         return ""
     reached = f"{_called(then.name)} reached {then.threshold:g}"
-    left = then.remaining
+    left = then.remaining_flights
     if came.crossed is None:
         since = "1 flight" if came.seen == 1 else f"{came.seen} flights"
         late = left is not None and came.seen > left.p95
@@ -71,10 +71,10 @@ def hindsight(then: FaultTrack, came: Came) -> str:
 
 def _sentence(one: FaultTrack) -> str:
     name = _called(one.name)
-    told = f"{name} drifts by {number(one.drift)} a flight ({_interval(one.drift90)})"
-    if one.remaining is None:
+    told = f"{name} drifts by {number(one.drift)} a flight ({_interval(one.drift_interval90)})"
+    if one.remaining_flights is None:
         return f"{told}: {one.reason}"
-    left = one.remaining
+    left = one.remaining_flights
     if left.p95 < 0.5:
         return f"{told} and has reached {one.threshold:g}"
     return (
@@ -86,20 +86,22 @@ def _sentence(one: FaultTrack) -> str:
 def _table(result: Tracked) -> Table:
     rows, remarks = [], []
     for one in result.faults.values():
-        left = one.remaining
+        left = one.remaining_flights
         span = f"{_flights(left.p05)} … {_flights(left.p50)} … {_flights(left.p95)}" if left else "–"
         drift = f"{number(one.drift)}" if one.trend else "–"
         threshold = "–" if one.threshold is None else f"{one.threshold:g}"
-        rows.append([_called(one.name), f"{one.level:.4f}", _interval(one.level90), drift, threshold, span])
-        remarks.append(one.reason if not one.trend or one.threshold is not None else "a trend; no threshold was given")
+        rows.append([_called(one.name), f"{one.level:.4f}", _interval(one.level_interval90), drift, threshold, span])
+        remarks.append(
+            one.reason or "" if not one.trend or one.threshold is not None else "a trend; no threshold was given"
+        )
     return Table(("level", "90 % interval", "a flight", "threshold", "flights left 5, 50, 95 %"), rows, remarks=remarks)
 
 
 def _ahead(result: Tracked) -> Table | None:
     rows = [
-        [_called(one.name), *(_chance(p) for _, p in one.remaining.crossing)]
+        [_called(one.name), *(_chance(soon.probability) for soon in one.crossing_probability)]
         for one in result.faults.values()
-        if one.remaining
+        if one.remaining_flights
     ]
     return Table([str(n) for n in AHEAD], rows, "crosses within the next flights, probability") if rows else None
 
@@ -107,7 +109,7 @@ def _ahead(result: Tracked) -> Table | None:
 def _jumps(result: Tracked) -> list[str]:
     return [
         f"{_called(one.name)} jumped from {jump.before:.3f} to {jump.after:.3f} before {jump.flight}"
-        f"{', as after a part was replaced' if jump.towards_healthy else ''}: it is judged anew from there"
+        f"{', as after a part was replaced' if jump.replaced else ''}: it is judged anew from there"
         for one in result.faults.values()
         for jump in one.jumps
     ]

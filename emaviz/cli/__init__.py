@@ -1,4 +1,4 @@
-"""The command line: `verbs` has a file for each of its commands, beside it stands what they share."""
+"""The command line: `verbs` has a file for each command that is no analysis, beside it stands what they share."""
 
 from __future__ import annotations
 
@@ -9,12 +9,13 @@ import time
 from collections.abc import Sequence
 from pathlib import Path
 
-from ema_model.members import names
+from ema_model.members import names, stated
 
 # Whatever takes time is imported where an interrupt ends the program as it should.
 from emaviz.cli.ending import ExitCode, until_interrupted
 
-COMMANDS = tuple(names("emaviz.cli.verbs"))
+# A file each, and the analyses, whose verbs are made of what they state.
+COMMANDS = tuple(sorted([*names("emaviz.cli.verbs"), *stated("ema_model.analyses", "OPTIONS")]))
 _WITHOUT_COMMAND = ("-h", "--help", "--version")
 _VERBOSE = ("-v", "--verbose")
 

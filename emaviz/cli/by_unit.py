@@ -28,7 +28,6 @@ Units = dict[str, list[Measurement]]
 def run(arguments: argparse.Namespace, actuator: Actuator) -> int:
     """Compares the units."""
     from ema_model.fleet.compare import compare_units
-    from ema_model.fleet.result import as_dict
 
     _refuse(arguments, _NOT_OF_UNITS)
     actuator = replace(actuator, effects={**actuator.effects, **option_values.effects_of(arguments, actuator.axes)})
@@ -38,12 +37,7 @@ def run(arguments: argparse.Namespace, actuator: Actuator) -> int:
             fitted, actuator, holdout=held, free=arguments.free, seed=arguments.seed, on_progress=progress.show
         )
 
-        def report(path: str, _: Mapping[str, Any]) -> None:
-            from emaviz.report import write_units_report
-
-            write_units_report(result, path)
-
-        return flow.Answer(result, as_dict(result), result.type_actuator, report=report)
+        return flow.of_result(result, result.type_actuator)
 
     return flow.run(arguments, actuator, compute, read_units)
 
@@ -66,9 +60,9 @@ def run_discovery(arguments: argparse.Namespace, actuator: Actuator, signals: tu
         )
 
         def report(path: str, _: Mapping[str, Any]) -> None:
-            from emaviz.report import write_units_discovery_report
+            from emaviz.views.export import export
 
-            write_units_discovery_report(result, path)
+            export(result, path)
 
         return flow.Answer(result, plain(as_dict(result)), result.compared.type_actuator, report=report)
 

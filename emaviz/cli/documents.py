@@ -146,6 +146,14 @@ class KeysJson(TypedDict):
     parameters: Annotated[list[KeyJson], Meta(description="by section")]
 
 
+class InterruptedTrackJson(TypedDict):
+    """What is besides in the answer of `track`."""
+
+    interrupted: NotRequired[Annotated[bool, Meta(description="true where not all flights were identified")]]
+    flights_identified: NotRequired[Annotated[int, Meta(description="how many were, before the interrupt")]]
+    flights_named: NotRequired[Annotated[int, Meta(description="how many there are")]]
+
+
 class CampaignJson(TypedDict):
     """How far a campaign is; of a run, `status` and `report`."""
 

@@ -9,12 +9,15 @@ from __future__ import annotations
 import argparse
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Any, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 from ema_model.actuator import Actuator, save_actuator
 from ema_model.errors import InputError
 from emaviz.cli import option_values, output
 from emaviz.cli.ending import ExitCode
+
+if TYPE_CHECKING:
+    from ema_model.result import Result
 
 Write = Callable[[str, Mapping[str, Any]], None]  # a file's path, and the options that the answer was computed with
 
@@ -30,6 +33,20 @@ class Answer:
     report: Write | None = None  # of --report; imports plotly, which takes a second
     is_whole: bool = True  # else it was interrupted, and its model is not saved
     saved: Callable[[], tuple[str, Mapping[str, Any]]] | None = None  # of the saved model: words, JSON
+
+
+def of_result(result: Result, actuator: Actuator | None = None) -> Answer:
+    """What a verb finds that answers with a result: it says, shows and exports itself.
+
+    actuator: of --save-actuator.
+    """
+
+    def write(path: str, configuration: Mapping[str, Any]) -> None:
+        from emaviz.views.export import export
+
+        export(result, path, configuration)
+
+    return Answer(result, result.to_dict(), actuator, record=write, report=write)
 
 
 Read = TypeVar("Read")  # recordings, or recordings by unit

@@ -283,8 +283,7 @@ def add_fit(parser: argparse.ArgumentParser, what: str) -> None:
     """What identify, compare and discover share: the recordings' part to use, and where the result, `what`, goes"""
     add_actuator(parser)
     add_mapping(parser)
-    parser.add_argument("--from", type=FINITE, dest="start_s", metavar="s", help="leave out what lies before")
-    parser.add_argument("--to", type=FINITE, dest="stop_s", metavar="s", help="leave out what lies after")
+    add_part(parser)
     parser.add_argument(
         "--holdout",
         action="append",
@@ -295,16 +294,27 @@ def add_fit(parser: argparse.ArgumentParser, what: str) -> None:
         "'kp200*'; repeat for more",
     )
     parser.add_argument(
-        "--runs",
-        metavar="COLUMN",
-        help="the column that numbers the runs of a file: each becomes a recording of its own, NAME#1, NAME#2 …",
-    )
-    parser.add_argument(
         "--save-actuator",
         type=SAVED_ACTUATOR,
         metavar="FILE.toml",
         help="write the fitted model as an actuator file",
     )
+    add_outputs(parser, what)
+
+
+def add_part(parser: argparse.ArgumentParser) -> None:
+    """--from, --to and --runs: which part of a recording is taken"""
+    parser.add_argument("--from", type=FINITE, dest="start_s", metavar="s", help="leave out what lies before")
+    parser.add_argument("--to", type=FINITE, dest="stop_s", metavar="s", help="leave out what lies after")
+    parser.add_argument(
+        "--runs",
+        metavar="COLUMN",
+        help="the column that numbers the runs of a file: each becomes a recording of its own, NAME#1, NAME#2 …",
+    )
+
+
+def add_outputs(parser: argparse.ArgumentParser, what: str) -> None:
+    """--record, --report, --json and --force, of the result, `what`"""
     add_record(parser, what)
     add_report(parser)
     add_json(parser)

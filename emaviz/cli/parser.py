@@ -6,16 +6,15 @@ Nothing that computes is imported for it: the help, the completion and a refusal
 from __future__ import annotations
 
 import argparse
-import importlib
 import sys
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from functools import partial
-from types import ModuleType
 from typing import Any, NoReturn
 
 import emaviz
 from ema_model.errors import InputError, did_you_mean, quoted
 from emaviz.cli import COMMANDS
+from emaviz.cli.analysis import verb_of
 from emaviz.cli.ending import EXIT_CODES
 from emaviz.cli.options import check_files
 
@@ -113,14 +112,13 @@ def _parser(verbs: Iterable[str], *, with_options: bool) -> Parser:
     parser.add_argument("--version", action=_Version, nargs=0, help="show the version and exit")
     _add_verbose(parser)
     commands = parser.add_subparsers(title="commands", metavar="COMMAND", required=True)
-    add_verbs(commands, "emaviz.cli.verbs", verbs, "run", with_options=with_options)
+    add_verbs(commands, {name: verb_of(name) for name in verbs}, "run", with_options=with_options)
     return parser
 
 
-def add_verbs(to: Any, package: str, verbs: Iterable[str], run: str, *, with_options: bool = True) -> None:
-    """Parsers of the verbs of a package, in their order; what is to be run is the `run` of what they parse."""
-    modules = {name: importlib.import_module(f"{package}.{name}") for name in verbs}
-    for name, verb in sorted(modules.items(), key=lambda one: one[1].PLACE):
+def add_verbs(to: Any, verbs: Mapping[str, Any], run: str, *, with_options: bool = True) -> None:
+    """Parsers of these verbs by name, in their order; what is to be run is the `run` of what they parse."""
+    for name, verb in sorted(verbs.items(), key=lambda one: one[1].PLACE):
         sub = to.add_parser(name, help=verb.HELP, description=verb.HELP)
         if with_options:
             sub.epilog = _ending(verb, sub.prog)
@@ -141,13 +139,13 @@ def _add_verbose(to: argparse.ArgumentParser) -> None:
     )
 
 
-def _ending(verb: ModuleType, command: str) -> str:
+def _ending(verb: Any, command: str) -> str:
     """The last line of --help; command: "emaviz compare"."""
     if not hasattr(verb, "documents"):
         return EXIT_CODES
     return f"{EXIT_CODES}.  Fields of --json: emaviz schema {command.removeprefix('emaviz ')}"
 
 
-def _run(verb: ModuleType, parser: argparse.ArgumentParser, arguments: argparse.Namespace) -> int:
+def _run(verb: Any, parser: argparse.ArgumentParser, arguments: argparse.Namespace) -> int:
     check_files(parser, arguments)
     return verb.run(arguments)

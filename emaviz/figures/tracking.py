@@ -81,8 +81,8 @@ def k_over_flights(
             annotation={"text": "threshold", "font": {"color": theme.MARK}, "xshift": _BESIDE_AXIS_PX},
             annotation_position="bottom left",
         )
-    if one.remaining is not None and one.threshold is not None:
-        left, end = one.remaining, one.threshold
+    if one.remaining_flights is not None and one.threshold is not None:
+        left, end = one.remaining_flights, one.threshold
         hidden = {"line": {"width": 0}, "hoverinfo": "skip", "mode": "lines", "showlegend": False}
         fan = go.Scatter(
             x=[now, now + left.p05, now + left.p95, now],
@@ -129,7 +129,7 @@ _USUAL, _FAR = 1.5, 2.0  # times the middle upper end, to which all are drawn; t
 def predicted_life(history: History, name: str, number: int, *, dark: bool = False) -> go.Figure:
     """Of one k, by flight; number: of the flight of today, which is marked."""
     title = f"Predicted flights left, {BY_NAME[name].label}"
-    left = {n: look.faults[name].remaining for n, look in history.looks.items()}
+    left = {n: look.faults[name].remaining_flights for n, look in history.looks.items()}
     runs = _runs([(n, one) for n, one in left.items() if one is not None])
     if not runs:
         return theme.missing(title, "no remaining life was said after any flight", dark=dark)

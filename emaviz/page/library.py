@@ -25,7 +25,7 @@ from emaviz.text.html import BOX, add_html, html, mathml, note, unescaped
 
 # --- an effect opened: its text, its equation, and what each parameter does -------------------------------------------
 
-WORKSPACE = Workspace("library", "Library", viser.Icon.BOOK, 7)
+WORKSPACE = Workspace("library", "Library", viser.Icon.BOOK, 8)
 
 _FIRST = "cogging_torque"  # shown until another one is chosen
 

@@ -42,7 +42,7 @@ from emaviz.text.terms import explained
 
 # --- everything on the page as one file: saved to the data folder and to the browser, loaded from either --------------
 
-WORKSPACE = Workspace("runs", "Runs", viser.Icon.LIST, 8, share=0.66)  # for the Rerun viewer
+WORKSPACE = Workspace("runs", "Runs", viser.Icon.LIST, 9, share=0.66)  # for the Rerun viewer
 
 _NONE = "–"
 

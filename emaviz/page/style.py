@@ -34,8 +34,8 @@ def page() -> Html:
     rules = unescaped(
         "<style>"
         # all tabs of the main panel in one line
-        "[data-dock-region=left] [data-dock-tab]{padding-left:3px!important;padding-right:3px!important;"
-        "font-size:11.5px!important}[data-dock-region=left] [data-dock-tab] *{font-size:inherit!important}"
+        "[data-dock-region=left] [data-dock-tab]{padding-left:2px!important;padding-right:2px!important;"
+        "font-size:11px!important}[data-dock-region=left] [data-dock-tab] *{font-size:inherit!important}"
         "[data-dock-region=left] [data-dock-tab] > div:has(svg){display:none!important}"
         # tabs stay in sight where what is below them scrolls
         ".mantine-ScrollArea-content [data-dock-area],[data-dock-region=left] .mantine-ScrollArea-content "

@@ -295,9 +295,9 @@ class TrackResult:
         one = then.faults[name]
         figures = [
             tracking.k_over_flights(then, name, last=last, levels=levels(history, name, number)),
-            tracking.remaining_life(one.remaining, came=history.came(number, name).crossed)
-            if one.remaining is not None
-            else tracking.none(one.reason),
+            tracking.remaining_life(one.remaining_flights, came=history.came(number, name).crossed)
+            if one.remaining_flights is not None
+            else tracking.none(one.reason or ""),
             tracking.predicted_life(history, name, number),
         ]
         told = said(then, name, history)
@@ -313,7 +313,7 @@ class TrackResult:
 def levels(history: History, name: str, number: int) -> dict[int, tuple[float, float, float]]:
     """Level of a k, and its 90 % interval, as they were known after each flight up to a number."""
     shown = {n: look.faults[name] for n, look in history.looks.items() if n <= number}
-    return {n: (one.level, *one.level90) for n, one in shown.items()}
+    return {n: (one.level, *one.level_interval90) for n, one in shown.items()}
 
 
 def said(then: Tracked, name: str, history: History) -> str:
@@ -336,7 +336,7 @@ def said(then: Tracked, name: str, history: History) -> str:
 def _first(last: Tracked) -> str:
     """The k to show first: one with a remaining life, a trend or a threshold, in this order."""
     every = list(last.faults.values())
-    return max(every, key=lambda one: (one.remaining is not None, one.trend, one.threshold is not None)).name
+    return max(every, key=lambda one: (one.remaining_flights is not None, one.trend, one.threshold is not None)).name
 
 
 # --- the Track tab: a folder of flights, thresholds, and the run ------------------------------------------------------

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from itertools import pairwise
@@ -59,6 +60,7 @@ class Chart:
     low: float
     high: float
     across: str = "s"
+    is_log: bool = False  # across: what is given, first and last too, are decimal logarithms
 
     @staticmethod
     def of(signal: str, time_s: ArrayLike, values: ArrayLike) -> Chart:
@@ -77,14 +79,16 @@ class Chart:
 
     def log_axes(self, stream: rr.RecordingStream, root: str) -> None:
         """The grid and its numbers, static."""
-        at, up = round_numbers(self.first, self.last, _TICKS), round_numbers(self.low, self.high, _TICKS)
+        at = _round_logarithms(self.first, self.last) if self.is_log else round_numbers(self.first, self.last, _TICKS)
+        up = round_numbers(self.low, self.high, _TICKS)
         lines = [self._line([x, x], [self.low, self.high]) for x in at]
         lines += [self._line([self.first, self.last], [y, y]) for y in up]
         grid = rr.LineStrips2D(lines, colors=[_GRID], radii=rr.Radius.ui_points(0.5), draw_order=-1.0)
         stream.log(f"{root}/grid", grid, static=True)
         spots = [(float(line[0][0]), 0.5 * _HEIGHT + 0.08) for line in lines[: len(at)]]
         spots += [(-0.15, float(line[0][1])) for line in lines[len(at) :]]
-        names = [f"{x:.3g} {self.across}".rstrip() for x in at] + [f"{y:.3g} {self.unit}".rstrip() for y in up]
+        told = [10.0**x if self.is_log else x for x in at]
+        names = [f"{x:.3g} {self.across}".rstrip() for x in told] + [f"{y:.3g} {self.unit}".rstrip() for y in up]
         ticks = rr.Points2D(spots, labels=names, show_labels=True, colors=[_INK], radii=rr.Radius.ui_points(0.0))
         stream.log(f"{root}/ticks", ticks, static=True)
 
@@ -92,6 +96,13 @@ class Chart:
         across = (np.asarray(x) - self.first) / ((self.last - self.first) or 1.0) * _WIDTH
         up = (np.asarray(y) - self.low) / (self.high - self.low)
         return np.stack([across, (0.5 - up) * _HEIGHT], axis=1)
+
+
+def _round_logarithms(first: float, last: float) -> list[float]:
+    """Those of 1, 2 and 5 times the powers of ten between two decimal logarithms; of many powers these alone."""
+    steps = (1.0, 2.0, 5.0) if last - first < 2.0 else (1.0,)
+    every = [n + math.log10(step) for n in range(math.floor(first), math.ceil(last) + 1) for step in steps]
+    return [one for one in every if first - 1e-9 <= one <= last + 1e-9]
 
 
 def measured(points: Array) -> rr.LineStrips2D:

@@ -13,7 +13,6 @@ from numpy.typing import ArrayLike
 
 from ema_model.errors import InputError
 from ema_model.quantities.numbers import HALF_90
-from ema_model.tracking.json_form import as_dict
 from ema_model.tracking.result import Tracked
 from emaviz.recording import writer as drawn_as
 from emaviz.recording.blueprint import plot
@@ -30,7 +29,7 @@ def write_tracking(result: Tracked, path: str | Path, configuration: Mapping[str
     """Writes a whole .rrd file; InputError in one line where that cannot be done."""
     try:
         with TrackingWriter(path, result) as writer:
-            writer.properties({"track": as_dict(result), **({"configuration": dict(configuration or {})})})
+            writer.properties({"track": result.to_dict(), "configuration": dict(configuration or {})})
             writer.answer()
             for name in result.faults:
                 writer.fault(name)
@@ -66,9 +65,13 @@ class TrackingWriter(RecordingWriter):
             self._line(f"{name}/{side}", f"{name} 90 % {side}", colours["floor_low"], self._at, band)
         now = len(self._result.flights)
         ahead = 0.0
-        if one.remaining is not None and one.threshold is not None:
-            ahead = min(one.remaining.p95, _MOST_AHEAD)
-            for share, flights in (("p05", one.remaining.p05), ("p50", one.remaining.p50), ("p95", one.remaining.p95)):
+        if one.remaining_flights is not None and one.threshold is not None:
+            ahead = min(one.remaining_flights.p95, _MOST_AHEAD)
+            for share, flights in (
+                ("p05", one.remaining_flights.p05),
+                ("p50", one.remaining_flights.p50),
+                ("p95", one.remaining_flights.p95),
+            ):
                 reach = min(flights, _MOST_AHEAD) / max(flights, 1e-9)
                 times = np.array([now, now + max(1, round(reach * flights))])
                 values = [one.level, one.level + reach * (one.threshold - one.level)]

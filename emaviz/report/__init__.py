@@ -3,17 +3,11 @@
 from emaviz.report.comparison import write_report
 from emaviz.report.discovery import write_discovery_report
 from emaviz.report.export import write_export_report
-from emaviz.report.fleet import write_units_report
-from emaviz.report.fleet_discovery import write_units_discovery_report
 from emaviz.report.identification import write_identification_report
-from emaviz.report.tracking import write_tracking_report
 
 __all__ = [
     "write_discovery_report",
     "write_export_report",
     "write_identification_report",
     "write_report",
-    "write_tracking_report",
-    "write_units_discovery_report",
-    "write_units_report",
 ]

@@ -16,9 +16,8 @@ from typing import Generic, TypeVar
 import plotly.graph_objects as go
 from plotly.offline import get_plotlyjs
 
-from ema_model.errors import InputError, quoted
-from ema_model.files.written import whole_file
-from ema_model.text import InWords, Lines, Note, Table
+from ema_model.files.written import write_text
+from ema_model.text import Block, InWords, Lines, Note, Table
 from emaviz import __version__
 from emaviz.figures.theme import DARK, LIGHT
 
@@ -166,17 +165,7 @@ def page(title: str, lead: str, sections: Sequence[Section[Subject]], subject: S
 
 def write(path: str | Path, text: str) -> None:
     """Writes a page, whole or not at all; InputError in one line where that cannot be done."""
-    target = Path(path)
-    try:
-        if target.is_dir():
-            raise InputError(f"{quoted(target)}: is a folder; name a file in it")
-        if not target.parent.is_dir():
-            raise InputError(f"{quoted(target)}: the folder {quoted(target.parent)} does not exist; make it first")
-        with whole_file(target) as draft:
-            draft.write_text(text, encoding="utf-8", newline="\n")
-    except OSError as error:
-        why = error.strerror or type(error).__name__
-        raise InputError(f"{quoted(target)}: the report cannot be written: {why}; write it elsewhere") from None
+    write_text(path, text, "the report")
 
 
 def _figures(figures: Figures) -> str:
@@ -208,6 +197,20 @@ def _own(name: str) -> str:
 # --- the section that says what the terminal says ---------------------------------------------------------------------
 
 
+def in_words(blocks: Iterable[Block]) -> str:
+    """Blocks of a result's document, one after another."""
+    return "".join(map(_block, blocks))
+
+
+def _block(block: Block) -> str:
+    if isinstance(block, Lines):
+        head = paragraph(block.title) if block.title else ""
+        return head + "".join(paragraph(line) for line in block.lines)
+    if isinstance(block, Note):
+        return bullets([block.line], "warning")
+    return with_remarks(block) if isinstance(block, Table) else ""
+
+
 class WordsSection(Section[Subject]):
     """The document of a result, block by block; a report's own file gives it to it."""
 
@@ -217,13 +220,4 @@ class WordsSection(Section[Subject]):
     def body(self, subject: Subject, figures: Figures) -> str:
         """Always there."""
         assert isinstance(subject, InWords)
-        written = []
-        for block in subject.document.blocks:
-            if isinstance(block, Lines):
-                written += [paragraph(block.title)] if block.title else []
-                written += [paragraph(line) for line in block.lines]
-            elif isinstance(block, Note):
-                written.append(bullets([block.line], "warning"))
-            elif isinstance(block, Table):
-                written.append(with_remarks(block))
-        return "".join(written)
+        return in_words(subject.document.blocks)

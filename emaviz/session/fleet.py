@@ -332,10 +332,10 @@ class ComparingUnits:
 
     def _keep(self, found: UnitsCompared, suffix: str) -> None:
         if suffix == REPORT:
-            from emaviz.report import write_units_report  # plotly takes half a second to import
+            from emaviz.views.export import export  # plotly takes half a second to import
 
             path = self.folder.fresh(self.folder.recordings, "units", suffix)
-            write_units_report(found, path)
+            export(found, path)
         else:
             path = self.folder.fresh(self.folder.actuators, "type", suffix)
             save_actuator(found.type_actuator, path)

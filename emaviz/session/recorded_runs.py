@@ -8,6 +8,7 @@ from datetime import datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from ema_model.analyses import analyses
 from ema_model.discovery.words import effect_title
 from ema_model.errors import InputError
 from ema_model.files.opened import shown
@@ -73,6 +74,7 @@ _KINDS: dict[str, tuple[str, Callable[[Mapping[str, Any]], str]]] = {
     "comparison": ("comparison", _comparison),
     "track": ("tracking", _tracking),
     "reproduce": ("evaluation", lambda _: "the thesis's tables beside ours"),
+    **{name: (in_sentence(one.title), lambda found: str(found["answer"][0])) for name, one in analyses().items()},
 }
 
 # --- past recordings: what the folder holds, with settings and results; renamed, deleted, read back -------------------

@@ -9,7 +9,7 @@ import threading
 import time
 from collections.abc import Collection, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -115,23 +115,6 @@ def _saved(one: Flight, path: Path | None) -> SavedFlight:
         return told if path is None else msgspec.structs.replace(told, file=path.name, changed=as_it_is(path))
     except OSError:  # it is gone since
         return told
-
-
-# --- what stays of followed flights in the data folder: the report, and the recording for Rerun -----------------------
-
-
-def keep(found: Tracked, actuator: str, folder: DataFolder, suffix: str) -> Path:
-    """Writes a report (.html) or a recording (.rrd) under a new name; returns where it is."""
-    path = folder.fresh(folder.recordings, "track", suffix)
-    if suffix == ".html":
-        from emaviz.report import write_tracking_report  # plotly takes a second to import
-
-        write_tracking_report(found, actuator, path)
-    else:
-        from emaviz.recording.tracking import write_tracking  # as does rerun
-
-        write_tracking(found, path)
-    return path
 
 
 # --- the flights of a folder: identified one after another, followed, and taken up as they arrive ---------------------
@@ -464,7 +447,12 @@ class Following:
         found = self.last
         if found is None:
             raise InputError("nothing is followed yet; press Track first")
-        self._files.post(
-            f"track {suffix}",
-            lambda: self.events.kept(keep(found, self.session.actuator.name, self.folder, suffix)),
-        )
+        path = self.folder.fresh(self.folder.recordings, "track", suffix)
+
+        def keep() -> None:
+            from emaviz.views.export import export  # plotly takes half a second to import
+
+            export(replace(found, actuator=self.session.actuator.name), path)
+            self.events.kept(path)
+
+        self._files.post(f"track {suffix}", keep)

@@ -64,10 +64,10 @@ def test_a_folder_is_followed_and_a_threshold_identifies_nothing_anew(following,
     shown = []
     following.events.followed.connect(shown.append)
     assert "done in" in followed(following) and len(asked) == COUNT
-    assert shown[0].last.faults["k1"].trend and shown[0].last.faults["k1"].remaining is None
+    assert shown[0].last.faults["k1"].trend and shown[0].last.faults["k1"].remaining_flights is None
     following.set_threshold("k1", 0.6)
     followed(following)
-    assert len(asked) == COUNT and following.last.faults["k1"].remaining is not None
+    assert len(asked) == COUNT and following.last.faults["k1"].remaining_flights is not None
     assert following.file_of(following.last.flights[3]) == "unit/flight_03.parquet"
     with pytest.raises(InputError, match="away from the healthy value"):
         following.set_threshold("k1", 0.0)
@@ -199,7 +199,10 @@ def test_a_session_keeps_the_flights_so_that_none_is_identified_again(following,
     new = another(following)
     last = restored(new, saved).last
     assert not asked and new.chosen == "unit" and new.thresholds == {"k1": 0.6}
-    assert str(last) == str(before) and last.faults["k1"].remaining.p50 == before.faults["k1"].remaining.p50
+    assert (
+        str(last) == str(before)
+        and last.faults["k1"].remaining_flights.p50 == before.faults["k1"].remaining_flights.p50
+    )
     assert new.file_of(last.flights[3]) == "unit/flight_03.parquet"
     assert new.saved() == saved
     new.watching = True

@@ -160,7 +160,7 @@ def test_sliders_answer_while_an_identification_runs(page, app):
 def test_all_tabs_stand_in_one_line_at_any_width_and_the_strip_holds_its_controls(page):
     tabs = page.locator("[data-dock-region=left] [data-dock-tab]")
     assert [name.strip() for name in tabs.all_inner_texts()] == [
-        "Explore", "Identify", "Compare", "Discover", "Units", "Track", "Library", "Runs"
+        "Explore", "Identify", "Compare", "Discover", "Units", "Track", "Bode", "Library", "Runs"
     ]  # fmt: skip
     for width in (1100, 1400):
         page.set_viewport_size({"width": width, "height": 900})

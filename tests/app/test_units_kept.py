@@ -10,7 +10,7 @@ import pytest
 
 from ema_model.actuator import load_actuator
 from ema_model.errors import InputError
-from ema_model.fleet.result import Alone, Difference, Need, OfRecording, OfType, Transfer, UnitsCompared, as_dict
+from ema_model.fleet.result import Alone, Difference, Need, OfRecording, OfType, Transfer, UnitsCompared
 from emaviz.session.fleet import read_saved, saved
 
 ACTUATOR = load_actuator()
@@ -41,7 +41,7 @@ def kept(found: UnitsCompared | None = FOUND):
 def test_the_answer_comes_back_whole():
     told, again = read_saved(kept())
     assert (told.folder, told.rule, told.actuator) == ("fleet", "*unseen*", ACTUATOR.name)
-    assert again is not None and as_dict(again) == as_dict(FOUND) and str(again) == str(FOUND)
+    assert again is not None and again.to_dict() == FOUND.to_dict() and str(again) == str(FOUND)
     assert again.type_actuator.value(PLAY) == 1.1e-5 and again.actuator.tolerances == ACTUATOR.tolerances
     assert read_saved(kept(None))[1] is None
 

@@ -60,7 +60,7 @@ def after(life: Life, flights: list[Flight], tracker: Tracker) -> dict[str, Quan
     at = np.array([number for number, _ in numbered])
     given = at[begin:], sign * (one.k[begin:] - healthy), one.sigma[begin:]
     now, threshold = float(len(flights)), sign * (life.threshold - healthy)
-    left = one.remaining
+    left = one.remaining_flights
     return {
         "emaviz": (np.nan,) * 3 if left is None else (left.p05, left.p50, left.p95),
         "exponential fit": exponential_fit(*given, now, threshold),

@@ -14,7 +14,7 @@ from ema_model.fleet import fit as fitting
 from ema_model.fleet.block import linearised, unit_of, wider
 from ema_model.fleet.compare import compare_units
 from ema_model.fleet.fit import At, fit, simpler
-from ema_model.fleet.result import as_dict, notes, sentences
+from ema_model.fleet.result import notes, sentences
 from ema_model.recordings import Measurement
 from ema_model.simulated_fleets import draw, recorded
 
@@ -87,12 +87,12 @@ def test_each_unit_is_told_alone(differing):
     assert own.value.shape == own.sigma.shape == (3,) and np.all((own.sigma > 0.0) & (own.sigma <= tolerance))
     off = (own.value - mean) / tolerance
     assert np.argmin(off) == 1 and off[1] < -0.4 and np.all(np.abs(off[[0, 2]]) < 0.2)
-    told = as_dict(differing)["units"][1]["parameters"][BACKLASH]
+    told = differing.to_dict()["units"][1]["parameters"][BACKLASH]
     assert told["unit"] == "rad" and told["interval90"][0] < told["value"] < told["interval90"][1]
 
 
 def test_json_has_the_same(differing):
-    told = as_dict(differing)
+    told = differing.to_dict()
     assert told["differences"][0]["unit"] == "unit_02" and told["differences"][0]["same_as"] == []
     assert [one["name"] for one in told["units"]] == ["unit_01", "unit_02", "unit_03"]
     assert len(told["transfer"]["floors"]) == 3 and BACKLASH in told["type"]
@@ -160,7 +160,7 @@ def test_what_recordings_disagree_in_is_said(disagreeing):
     assert any(
         re.match(r"unit_02: recording \w+ disagrees .* zero of its current .* A; this is allowed", one) for one in lines
     )
-    assert [one["unit"] for one in as_dict(disagreeing)["of_recordings"]] == ["unit_02", "unit_03"]
+    assert [one["unit"] for one in disagreeing.to_dict()["of_recordings"]] == ["unit_02", "unit_03"]
     assert any(one.startswith("unit_03: ") and "undo that delay" in one for one in lines)
     assert sentences(disagreeing) == [
         "nothing is found in which the others differ",

@@ -23,6 +23,7 @@ import pytest
 from rerun.chunk import RrdReader
 from support.bench_units import ACTUATOR, write_units
 from support.cheap_plans import cheap
+from support.flexible_drive import flexible_drive
 
 from ema_model.recordings import Measurement, write_measurement
 from emaviz.cli import main
@@ -98,6 +99,8 @@ CASES = (
         exact=False,
         long=True,
     ),
+    Case("frequency", "frequency sweep.csv --actuator bench.toml " + ALL.format("q"), exact=False),
+    Case("frequency_step", "frequency jump.csv --actuator bench.toml --json j.json"),
     Case("effects", "effects"),
     Case("effect", "effects cogging_torque --json f.json"),
     Case("own_effect", "effects user_torque"),
@@ -125,6 +128,8 @@ def inputs(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
     (folder / "single" / "left").rename(folder / "left")
     assert main(["actuator", "new", "bench.toml", "--name=bench", *ACTUATOR]) == 0
     write_measurement(_pushed(), folder / "push.csv")
+    write_measurement(flexible_drive(3, 22.0), folder / "sweep.csv")
+    write_measurement(_jumped(), folder / "jump.csv")
     run = "simulate --fault k1=0.3 --noise-current 0.1 --seed 3"
     assert main([*run.split(), "--duration=0.1", "--out=chirp.csv"]) == 0
     assert main([*run.split(), "--duration=0.5", "--out=moves.csv"]) == 0  # shows enough for a verdict to be firm
@@ -142,6 +147,14 @@ def _pushed() -> Measurement:
     torque = 1e-4 * np.gradient(speed, time) + 0.01 * np.sign(speed) + 0.003 * np.sin(12.0 * position + 0.4)
     current = torque / 0.05 + 0.01 * random.standard_normal(len(time))
     return Measurement({"time_s": time, "motor_position_rad": position, "current_A": current})
+
+
+def _jumped() -> Measurement:
+    """The same motor, pushed once."""
+    time = np.arange(0.0, 3.0, 2e-3)
+    current = np.where((time > 1.0) & (time < 1.2), 1.0, 0.0)
+    speed = 500.0 * np.cumsum(current) * 2e-3
+    return Measurement({"time_s": time, "motor_position_rad": np.cumsum(speed) * 2e-3, "current_A": current})
 
 
 @pytest.mark.parametrize(

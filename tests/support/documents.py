@@ -3,19 +3,19 @@
 from __future__ import annotations
 
 import json
-from importlib import import_module
 from pathlib import Path
 from typing import Any
 
 import msgspec
 
 from emaviz.cli.documents import HeadJson
+from emaviz.cli.verbs.schema import verbs_with_documents
 
 
 def result_of(path: str | Path, verb: str) -> dict[str, Any]:
     """The result that a command wrote, "compare" or "actuator check": it has what is stated, and nothing else."""
     found = json.loads(Path(path).read_text(encoding="utf-8"))
-    check_document(found, import_module(f"emaviz.cli.verbs.{verb.replace(' ', '.')}").documents())
+    check_document(found, verbs_with_documents()[verb].documents())
     return found
 
 

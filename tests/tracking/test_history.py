@@ -29,7 +29,9 @@ def history():
 def test_a_look_is_what_was_known_that_day(history):
     assert [*history.looks] == [*range(LEAST_FLIGHTS, len(ALL) + 1)]
     then, alone = history.looks[60], track(ALL[:60], {"k1": AT})
-    assert str(then) == str(alone) and then.faults["k1"].remaining.p50 == alone.faults["k1"].remaining.p50
+    assert (
+        str(then) == str(alone) and then.faults["k1"].remaining_flights.p50 == alone.faults["k1"].remaining_flights.p50
+    )
     assert history.last is history.looks[len(ALL)]
 
 
@@ -68,12 +70,18 @@ def test_before_there_are_enough_there_is_no_look():
 
 @pytest.mark.parametrize("far", [1.0, 50.0])
 def test_the_band_of_the_predicted_life_stays_within_its_axis(history, far):
-    said = {n: look.faults["k1"].remaining for n, look in history.looks.items() if look.faults["k1"].remaining}
+    said = {
+        n: look.faults["k1"].remaining_flights
+        for n, look in history.looks.items()
+        if look.faults["k1"].remaining_flights
+    }
     first = min(said)
     look, one = history.looks[first], history.looks[first].faults["k1"]
     left = replace(said[first], p95=far * sorted(left.p95 for left in said.values())[len(said) // 2])
     odd = History(history.thresholds)
-    odd.looks = history.looks | {first: replace(look, faults={**look.faults, "k1": replace(one, remaining=left)})}
+    odd.looks = history.looks | {
+        first: replace(look, faults={**look.faults, "k1": replace(one, remaining_flights=left)})
+    }
     odd.flights = history.flights
     figure = tracking.predicted_life(odd, "k1", 100)
     low, high = figure.layout.yaxis.range

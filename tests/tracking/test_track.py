@@ -11,7 +11,6 @@ from support.flights import flights
 from ema_model.errors import InputError
 from ema_model.simulated_lives import drawn, healthy_life, worn_life
 from ema_model.tracking.flights import Flight
-from ema_model.tracking.json_form import as_dict
 from ema_model.tracking.track import Tracker, track
 
 
@@ -19,20 +18,21 @@ def test_a_steady_drift_is_told_with_the_life_that_remains():
     result = track(flights(0.002 * np.arange(100)), {"k1": 0.4})
     one = result.faults["k1"]
     assert one.trend and one.drift == pytest.approx(0.002, rel=0.15) and one.level == pytest.approx(0.2, abs=0.02)
-    left = one.remaining
+    left = one.remaining_flights
     assert left is not None and left.p05 < 100 < left.p95 and left.p50 == pytest.approx(100, rel=0.3)
-    chances = [chance for _, chance in left.crossing]
+    chances = [soon.probability for soon in left.crossing]
     assert chances == sorted(chances) and chances[0] < 0.01 and chances[-1] > 0.9
     others = [name for name, other in result.faults.items() if other.trend]
     assert others == ["k1"] and "k1 friction drifts" in str(result)
-    document = as_dict(result)["faults"]["k1"]
+    assert "None" not in str(result) and "None" not in result._repr_html_(), "of k1 there is no reason to say"
+    document = result.to_dict()["faults"]["k1"]
     assert document["remaining_flights"]["p05"] == left.p05 and document["trend"] is True
 
 
 def test_without_evidence_there_is_no_trend_and_no_life():
     result = track(flights(np.full(120, 0.2)), {"k1": 0.4})
     one = result.faults["k1"]
-    assert not one.trend and one.remaining is None and one.reason == "no trend; remaining life not defined"
+    assert not one.trend and one.remaining_flights is None and one.reason == "no trend; remaining life not defined"
     assert one.level == pytest.approx(0.2, abs=0.01) and "no trend" in str(result)
 
 
@@ -83,9 +83,9 @@ def test_a_replaced_part_is_seen_and_judged_anew():
     k1 = np.concatenate([0.003 * np.arange(80), 0.003 * np.arange(60)])
     result = track(flights(k1), {"k1": 0.4})
     one = result.faults["k1"]
-    assert [(jump.flight, jump.towards_healthy) for jump in one.jumps] == [("f080", True)]
-    assert one.trend and one.remaining is not None
-    assert one.remaining.p05 < (0.4 - k1[-1]) / 0.003 < one.remaining.p95
+    assert [(jump.flight, jump.replaced) for jump in one.jumps] == [("f080", True)]
+    assert one.trend and one.remaining_flights is not None
+    assert one.remaining_flights.p05 < (0.4 - k1[-1]) / 0.003 < one.remaining_flights.p95
     after = track(flights(k1)[:84], {"k1": 0.4}).faults["k1"]
     assert not after.trend and after.level < 0.05
 
@@ -100,7 +100,7 @@ def test_a_small_step_back_is_seen_once_more_flights_follow():
         later += track(life[:57]).faults["k1"].jumps
         assert not track(flights(np.full(57, 0.105), sigma=0.015, seed=seed)).faults["k1"].jumps
     assert len(soon) < 4 and len(later) > 5
-    assert all(one.flight in ("f049", "f050", "f051") and one.towards_healthy for one in later)
+    assert all(one.flight in ("f049", "f050", "f051") and one.replaced for one in later)
     assert np.mean([one.before - one.after for one in later]) == pytest.approx(0.105, abs=0.02)
 
 
@@ -110,7 +110,7 @@ def test_a_jump_is_told_without_what_the_unit_adds():
     seen = track(drawn(life)[:130]).faults["k4"]
     (one,) = seen.jumps
     assert life.repaired == 103 and one.flight == "flight_0103"
-    assert one.towards_healthy and one.before > 0.06 and abs(one.after) < 0.03 and not seen.trend
+    assert one.replaced and one.before > 0.06 and abs(one.after) < 0.03 and not seen.trend
 
 
 def test_a_drift_that_may_be_none_has_no_end_but_a_least_life():
@@ -120,7 +120,7 @@ def test_a_drift_that_may_be_none_has_no_end_but_a_least_life():
     for flight in drawn(life)[:254]:
         tracker.add(flight)
     one = tracker.look().faults[life.fault]
-    assert one.trend and one.remaining is None
+    assert one.trend and one.remaining_flights is None
     least = int(
         re.fullmatch(r"more than (\d+) flights remain \(95 %\); it may never reach its threshold", one.reason)[1]
     )
@@ -135,7 +135,7 @@ def test_flights_that_do_not_fit_are_left_out_and_many_of_them_end_the_trust():
     assert result.trusted and result.faults["k1"].trend and len(result.usable) == 80 - 11
     assert "left out: f003" in str(result)
     lost = track([*life[:72], *bad[72:]], {"k1": 0.5})
-    assert not lost.trusted and lost.faults["k1"].remaining is None and "Discover" in lost.warnings[0]
+    assert not lost.trusted and lost.faults["k1"].remaining_flights is None and "Discover" in lost.warnings[0]
 
 
 def test_noise_larger_than_stated_is_seen():
@@ -152,8 +152,8 @@ def test_a_gain_may_drift_to_either_side():
             k[7] += sign * 0.002 * i
             life.append(Flight(one.name, k, one.own, one.common))
         here, away = (track(life, {"k8": 0.5 + side * sign * 0.3}).faults["k8"] for side in (1.0, -1.0))
-        assert here.trend and here.remaining is not None and here.drift == pytest.approx(sign * 0.002, rel=0.2)
-        assert away.trend and away.remaining is None and "away" in away.reason
+        assert here.trend and here.remaining_flights is not None and here.drift == pytest.approx(sign * 0.002, rel=0.2)
+        assert away.trend and away.remaining_flights is None and "away" in away.reason
 
 
 @pytest.mark.parametrize("law", ["linear", "accelerating", "onset"])
@@ -163,7 +163,7 @@ def test_drawn_lives_are_told_before_they_end(law):
     for i, flight in enumerate(drawn(life)):
         tracker.add(flight)
         if i % 40 == 39 and tracker.has_trend(life.fault):
-            told.append(tracker.look().faults[life.fault].remaining)
+            told.append(tracker.look().faults[life.fault].remaining_flights)
     assert told and any(one is not None for one in told)
 
 

@@ -105,9 +105,9 @@ def test_a_replaced_part_is_seen_through_changing_commands():
 def test_the_answer_is_the_laws_where_all_is_known():
     """Even wear, nothing that the unit adds, little noise: the way that is left over the rate."""
     one = track(flights(0.002 * np.arange(150), 0.001), {"k1": 0.5}).faults["k1"]
-    assert one.remaining is not None
-    assert one.remaining.p50 == pytest.approx((0.5 - 0.298) / 0.002, rel=0.05)
-    assert 60.0 < one.remaining.p05 < 101.0 < one.remaining.p95 < 125.0
+    assert one.remaining_flights is not None
+    assert one.remaining_flights.p50 == pytest.approx((0.5 - 0.298) / 0.002, rel=0.05)
+    assert 60.0 < one.remaining_flights.p05 < 101.0 < one.remaining_flights.p95 < 125.0
 
 
 def test_what_the_unit_adds_is_taken_out_of_k():
@@ -115,7 +115,7 @@ def test_what_the_unit_adds_is_taken_out_of_k():
     one, raw = track(life, {"k1": 0.4}).faults["k1"], np.array([flight.k[0] for flight in life])
     true = 0.002 * np.arange(100)
     assert np.std(one.k - true) < 0.5 * np.std(raw - true)
-    assert one.level90[0] < 0.198 < one.level90[1] and one.level == pytest.approx(0.198, abs=0.02)
+    assert one.level_interval90[0] < 0.198 < one.level_interval90[1] and one.level == pytest.approx(0.198, abs=0.02)
 
 
 def test_intervals_hold_lives_of_a_few_seeds():
@@ -126,7 +126,7 @@ def test_intervals_hold_lives_of_a_few_seeds():
         for i, flight in enumerate(drawn(life)):
             tracker.add(flight)
             if i % 15 == 14 and (life.repaired or 0) + 20 < i < last and tracker.has_trend(life.fault):
-                left = tracker.look().faults[life.fault].remaining
+                left = tracker.look().faults[life.fault].remaining_flights
                 held += [left.p05 <= last - i <= left.p95] if left else []
     assert len(held) > 40 and 0.75 <= np.mean(held)
 

@@ -107,7 +107,7 @@ def _run(inputs: TaskInputs, settings: Settings, seed: int) -> dict[str, Any]:
 
 
 def _told_after(tracker: Tracker, life: Life, i: int) -> Told:
-    left = tracker.look().faults[life.fault].remaining
+    left = tracker.look().faults[life.fault].remaining_flights
     told = (np.nan, np.nan, np.nan) if left is None else (left.p05, left.p50, left.p95)
     return Told(i, float(life.flights - 1 - i), *told)
 

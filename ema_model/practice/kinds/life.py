@@ -43,7 +43,7 @@ class OneLife(Kind):
         lines.append(f"in truth it was {k[0]:.3f} in the first flight and {k[count - 1]:.3f} in the last one recorded")
         if not isinstance(found, Tracked):
             return Revealed(tuple(lines))
-        said = found.faults[life.fault].remaining
+        said = found.faults[life.fault].remaining_flights
         late = left - (len(found.flights) - count)  # as it was to be said after the last flight that was looked at
         return Revealed(tuple(lines), said is not None and bool(np.floor(said.p05) <= late <= np.ceil(said.p95)))
 

@@ -45,9 +45,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def documents() -> tuple[type, ...]:
     """What --json holds: of recordings, and of units beside each other."""
     from ema_model.comparison.result import ComparisonJson
-    from ema_model.fleet.result import UnitsComparedJson
+    from ema_model.fleet.result import UnitsCompared
+    from ema_model.result import json_type
 
-    return (ComparisonJson, UnitsComparedJson)
+    return (ComparisonJson, json_type(UnitsCompared))
 
 
 def run(arguments: argparse.Namespace) -> int:

@@ -5,12 +5,12 @@ from __future__ import annotations
 import argparse
 import importlib
 import json
-from types import ModuleType
 from typing import Any
 
 from ema_model.errors import InputError, did_you_mean, quoted
 from ema_model.members import names
 from emaviz.cli import COMMANDS
+from emaviz.cli.analysis import verb_of
 
 HELP = "print what the fields of a command's --json mean, as JSON Schema"
 PLACE = 14
@@ -38,11 +38,11 @@ def run(arguments: argparse.Namespace) -> int:
     return 0
 
 
-def verbs_with_documents() -> dict[str, ModuleType]:
-    """The commands that write --json, "compare" or "actuator check", with their modules."""
+def verbs_with_documents() -> dict[str, Any]:
+    """The commands that write --json, "compare" or "actuator check"."""
     found = {}
     for name in COMMANDS:
-        verb = importlib.import_module(f"emaviz.cli.verbs.{name}")
+        verb = verb_of(name)
         if hasattr(verb, "__path__"):
             inner = {one: importlib.import_module(f"{verb.__name__}.{one}") for one in names(verb.__name__)}
             found |= {f"{name} {one}": module for one, module in inner.items()}
@@ -51,7 +51,7 @@ def verbs_with_documents() -> dict[str, ModuleType]:
     return {name: verb for name, verb in found.items() if hasattr(verb, "documents")}
 
 
-def schema_of(name: str, verb: ModuleType) -> dict[str, Any]:
+def schema_of(name: str, verb: Any) -> dict[str, Any]:
     """JSON Schema (2020-12) of a command's --json: the head, and one of its documents."""
     import msgspec
 

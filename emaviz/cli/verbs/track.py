@@ -6,8 +6,9 @@ import argparse
 import sys
 import time
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from ema_model.errors import InputError, quoted
 from emaviz.cli import options
@@ -53,9 +54,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def documents() -> tuple[type, ...]:
     """What --json holds."""
-    from ema_model.tracking.json_form import TrackedJson
+    from ema_model.result import json_type
+    from ema_model.tracking.result import Tracked
+    from emaviz.cli.documents import InterruptedTrackJson
 
-    return (TrackedJson,)
+    return (json_type(Tracked, InterruptedTrackJson),)
 
 
 def run(arguments: argparse.Namespace) -> int:
@@ -121,26 +124,14 @@ def _tell(
     of: int | None = None,
 ) -> None:
     """Writes and prints what flights say; of: as many as there would have been without an interrupt."""
-    from ema_model.tracking.json_form import as_dict
     from ema_model.tracking.track import track
     from emaviz.cli import flow
 
-    result = track(flights, thresholds, arguments.seed)
-    document = as_dict(result)
+    answer = flow.of_result(replace(track(flights, thresholds, arguments.seed), actuator=actuator.name))
     if of is not None:
-        document |= {"interrupted": True, "flights_identified": len(flights), "flights_named": of}
-
-    def record(path: str, configuration: Mapping[str, Any]) -> None:
-        from emaviz.recording.tracking import write_tracking
-
-        write_tracking(result, path, configuration)
-
-    def report(path: str, _: Mapping[str, Any]) -> None:
-        from emaviz.report import write_tracking_report
-
-        write_tracking_report(result, actuator.name, path)
-
-    flow.finish(arguments, flow.Answer(result, document, record=record, report=report), progress)
+        more = {"interrupted": True, "flights_identified": len(flights), "flights_named": of}
+        answer = replace(answer, document={**answer.document, **more})
+    flow.finish(arguments, answer, progress)
 
 
 def _watch(

@@ -1,0 +1,223 @@
+"""What every analysis answers with: a frozen dataclass that says, shows, exports and restores itself.
+
+A field is in the JSON form where its type says what it means: `Annotated[float, Meta(description="Hz")]`.  So is a
+property with such a type, which is told and not restored.  The schema is made of the same types.
+"""
+
+from __future__ import annotations
+
+import importlib
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, fields, is_dataclass
+from functools import cache
+from importlib.metadata import entry_points
+from pathlib import Path
+from types import NoneType, UnionType
+from typing import Annotated, Any, Protocol, Self, TypedDict, Union, cast, get_args, get_origin, get_type_hints
+
+import msgspec
+import numpy as np
+from msgspec import Meta
+
+from ema_model.errors import InputError, quoted
+from ema_model.files.written import write_text
+from ema_model.quantities.numbers import plain
+from ema_model.text import InWords, Lines
+
+VIEWS = "ema_model.views"  # the group of entry points of packages that show results
+
+
+NAME = {"is_name": True}  # `Meta(…, extra=NAME)`: a signal's or a parameter's name inside, or several, or keys
+
+
+class Shows(Protocol):
+    """What a package offers that shows results; its entry point in the group `VIEWS` is a module with these."""
+
+    SUFFIXES: tuple[str, ...]
+    figures: Callable[[Any], list[Any]]  # of a result, in reading order
+    export: Callable[[Any, Path], None]  # writes a result in the form that the suffix names
+
+
+class Result(InWords):
+    """Base of the frozen dataclasses that analyses return; `document` says it in words, for print and notebooks."""
+
+    def to_dict(self) -> dict[str, Any]:
+        """The JSON form: plain values only; a number that is not finite is None."""
+        return _as_dict(self, self.name_in_files)
+
+    def name_in_files(self, name: str) -> str:
+        """A signal or a parameter as files call it, by its name inside; asked of what is a `NAME`."""
+        return name
+
+    @classmethod
+    def from_dict(cls, given: Mapping[str, Any]) -> Self:
+        """What `to_dict` gave; InputError, one line, for what does not fit the types."""
+        try:
+            return msgspec.convert(_stored(given, cls), cls, dec_hook=_array)
+        except (msgspec.ValidationError, ValueError, TypeError) as error:
+            raise InputError(f"no {cls.__name__} can be made of it ({quoted(error, 120)}); compute it anew") from None
+
+    @property
+    def sentences(self) -> list[str]:
+        """All that `document` says in sentences, its tables left out."""
+        told = self.document.blocks
+        return [line for block in told if isinstance(block, Lines) for line in block.lines]
+
+    def figures(self) -> list[Any]:
+        """Plotly figures in reading order, of the package that shows results."""
+        return _shows().figures(self)
+
+    def export(self, path: str | Path) -> None:
+        """Writes a file whose suffix names its form: .json, .csv, .html (a report), .rrd (for the Rerun viewer).
+
+        It is written whole or not at all; InputError, one line, where it cannot be.
+        """
+        target = Path(path)
+        if target.suffix == ".json":
+            text = msgspec.json.format(msgspec.json.encode(self.to_dict()), indent=1).decode()
+            write_text(target, f"{text}\n", "the result")
+            return
+        shows = _shows()
+        if target.suffix not in shows.SUFFIXES:
+            known = ", ".join((".json", *shows.SUFFIXES))
+            raise InputError(f"{quoted(target)}: a result is written as {known}; let the name end in one of these")
+        shows.export(self, target)
+
+
+_at_hand: list[Shows] = []
+
+
+def shown_by(package: Shows) -> None:
+    """Has a package show results that is imported already, as where the program runs from its sources."""
+    _at_hand[:] = [package]
+
+
+def _shows() -> Shows:
+    """The package that shows results, else the installed one: the science itself knows none."""
+    if not _at_hand:
+        for one in entry_points(group=VIEWS):
+            shown_by(cast(Shows, importlib.import_module(one.value)))  # a module is what it offers
+    if not _at_hand:
+        raise InputError("no package is installed that shows results; install emaviz anew")
+    return _at_hand[0]
+
+
+# --- the JSON form and its schema, both of a class's types ------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Described:
+    """A field, or a property, that is in the JSON form."""
+
+    attribute: str
+    type: Any  # with what it means
+    is_name: bool
+
+
+@cache
+def described(kind: type) -> dict[str, Described]:
+    """What is in the JSON form of a dataclass, by its name there: its fields, then its properties.
+
+    That is the attribute's own name, unless `Meta(extra={"as": …})` says another.
+    """
+    hints = get_type_hints(kind, include_extras=True)
+    types = {one.name: hints[one.name] for one in fields(kind)}
+    for base in reversed(kind.__mro__):
+        for name, one in vars(base).items():
+            if isinstance(one, property) and one.fget is not None:
+                types[name] = get_type_hints(one.fget, include_extras=True).get("return")
+    found = {}
+    for name, of in types.items():
+        said = [one for one in getattr(of, "__metadata__", ()) if isinstance(one, Meta)]
+        if said:
+            extra = said[0].extra or {}
+            found[extra.get("as", name)] = Described(name, of, extra.get("is_name", False))
+    return found
+
+
+@cache
+def json_type(kind: type, *more: type) -> Any:
+    """A TypedDict of the JSON form of a dataclass: what its schema is made of, and what a document is held against.
+
+    more: TypedDicts of what a verb says besides.
+    """
+    types = {name: _json(one.type) for name, one in described(kind).items()}
+    for one in more:
+        types |= get_type_hints(one, include_extras=True)
+    made = TypedDict(kind.__name__, types)  # type: ignore[operator]
+    made.__doc__ = (kind.__doc__ or "").strip().partition("\n")[0]
+    return made
+
+
+def _json(of: Any) -> Any:
+    """A type of the JSON form, of one of a field."""
+    origin, parts = get_origin(of), get_args(of)
+    if origin is Annotated:
+        inner, *said = parts
+        dimensions = next((one.extra.get("dimensions", 1) for one in said if isinstance(one, Meta) and one.extra), 1)
+        made = _rows(dimensions) if get_origin(inner) is np.ndarray else _json(inner)
+        return Annotated[(made, *said)]
+    if origin is np.ndarray:
+        return _rows(1)
+    if isinstance(of, type) and is_dataclass(of):
+        return json_type(of)
+    if origin is tuple:
+        if parts[-1] is ...:
+            return list[_json(parts[0])]
+        return Annotated[list[_json(parts[0])], Meta(min_length=len(parts), max_length=len(parts))]
+    if origin in (Union, UnionType):
+        return Union[tuple(_json(one) for one in parts)]  # noqa: UP007  made of parts
+    if parts:
+        return origin[tuple(_json(one) for one in parts)]  # type: ignore[index]
+    return of
+
+
+def _rows(dimensions: int) -> Any:
+    return list[_rows(dimensions - 1)] if dimensions else float | None
+
+
+def _as_dict(value: Any, in_files: Callable[[str], str]) -> Any:
+    if is_dataclass(value) and not isinstance(value, type):
+        found = {}
+        for name, one in described(type(value)).items():
+            told = _as_dict(getattr(value, one.attribute), in_files)
+            found[name] = _renamed(told, in_files) if one.is_name else told
+        return found
+    if isinstance(value, Mapping):
+        return {name: _as_dict(one, in_files) for name, one in value.items()}
+    if isinstance(value, list | tuple):
+        return [_as_dict(one, in_files) for one in value]
+    return plain(value.tolist() if isinstance(value, np.ndarray) else value)
+
+
+def _renamed(value: Any, in_files: Callable[[str], str]) -> Any:
+    """A name, several, or what is told by name."""
+    if isinstance(value, dict):
+        return {in_files(name): one for name, one in value.items()}
+    return in_files(value) if isinstance(value, str) else [in_files(name) for name in value]
+
+
+def _stored(given: Any, kind: Any) -> Any:
+    """The same without what properties tell, which fields hold already; None in place of a number is NaN."""
+    if get_origin(kind) is Annotated:
+        return _stored(given, get_args(kind)[0])
+    if isinstance(given, Mapping) and isinstance(kind, type) and is_dataclass(kind):
+        hints = get_type_hints(kind, include_extras=True)
+        return {one.name: _stored(given[one.name], hints[one.name]) for one in fields(kind) if one.name in given}
+    if given is None:
+        return float("nan") if kind is float else None
+    parts = [one for one in get_args(kind) if one not in (NoneType, ...)]
+    if isinstance(given, Mapping) and get_origin(kind) is dict:
+        return {name: _stored(one, parts[1]) for name, one in given.items()}
+    if get_origin(kind) in (Union, UnionType):
+        return _stored(given, parts[0]) if len(parts) == 1 else given
+    if isinstance(given, list | tuple) and get_origin(kind) in (list, tuple):
+        return [_stored(one, parts[min(i, len(parts) - 1)]) for i, one in enumerate(given)]
+    return given
+
+
+def _array(kind: Any, given: Any) -> Any:
+    """Of msgspec: what it has no reader for."""
+    if get_origin(kind) is np.ndarray or kind is np.ndarray:
+        return np.array(given, dtype=float)  # None becomes NaN
+    raise NotImplementedError(f"{kind} is not restored")

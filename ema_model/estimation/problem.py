@@ -480,8 +480,8 @@ class Problem:
         if "load" in own:
             effects = {**effects, LOAD: {"torque_Nm": own["load"]}}
         actuator = self.model.actuator.varied(self.parameters(x))
-        start = (own.get(kind, 0.0) for kind in ("turned", "play", "faster", "pull"))
-        return Rig(actuator, self.k(x), *start, effects)
+        turned, play, faster, pull = (own.get(kind, 0.0) for kind in ("turned", "play", "faster", "pull"))
+        return Rig(actuator, self.k(x), turned, play, faster, pull, effects)
 
 
 def _room(n: int, count: int, others: int) -> int:

@@ -244,7 +244,7 @@ def _everywhere(
     for place, window in enumerate(plant.windows):
         i = started.get((window.recording, window.first))
         for target, model, faults, start in (
-            (before, actuator, actuator.k, ()),
+            (before, actuator, actuator.k, (0.0, 0.0, 0.0, 0.0)),
             (after, calibration.actuator, calibration.k, calibration.start_of(i)),
         ):
             one = plant.signals(place, model, faults, *start)

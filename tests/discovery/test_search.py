@@ -115,8 +115,17 @@ def test_a_hidden_effect_is_named_with_how_probable_it_is():
     assert "That cogging torque is missing is > 99.9 % probable." in str(found)
 
 
-def test_what_promises_more_than_the_refitted_is_refitted_too(monkeypatch):
-    """A delay that looks best by algebra, and is nothing once refitted, hides no other."""
+@pytest.mark.parametrize(
+    ("against", "is_within", "refitted"),
+    [
+        ("", False, [("next", 12.0), ("best", -1.0)]),
+        ("next", False, [("next", 12.0), ("third", 3.0), ("best", -1.0)]),
+        ("", True, []),
+    ],
+    ids=["nothing speaks against them", "something does against one", "nothing is left to be told"],
+)
+def test_what_promises_more_than_the_refitted_is_refitted_too(monkeypatch, against, is_within, refitted):
+    """What looks best by algebra, and is nothing once refitted, hides no other; nor does what cannot be."""
     gains = {"best": 25.0, "next": 14.0, "third": 4.0, "hopeless": 1.0}
     terms = [
         SimpleNamespace(
@@ -125,16 +134,20 @@ def test_what_promises_more_than_the_refitted_is_refitted_too(monkeypatch):
         for n, g in gains.items()
     ]
     real = {"best": -1.0, "next": 12.0, "third": 3.0}
-    of = search.Search(SimpleNamespace(added=(), data=None, held=None))
+    of = search.Search(SimpleNamespace(added=(), data=None, held=None, current=None, refused={}))
     before = Evident(0.0, 0.0, 0.0)
     seen = search.Round(None, None, before, (), terms)
     monkeypatch.setattr(of, "_round", lambda: seen)
     monkeypatch.setattr(of, "_is_far", lambda: False)
     monkeypatch.setattr(
-        search, "fits", lambda job, chosen, tell: [SimpleNamespace(fit=one.candidate.name) for one in chosen]
+        search,
+        "fits",
+        lambda job, chosen, tell: [SimpleNamespace(fit=one.candidate.name, candidate=one.candidate) for one in chosen],
     )
     monkeypatch.setattr(search, "evidence_of_fit", lambda data, held, fit, noise: Evident(real[fit], 0.0, 0.0))
-    assert [(one.trial.fit, one.gain) for one in of._contenders()] == [("next", 12.0), ("best", -1.0)]
+    monkeypatch.setattr(search, "within_band", lambda data, found: is_within)
+    monkeypatch.setattr(of, "_spoken_against", lambda one: "it is none" if one.trial.fit == against else "")
+    assert [(one.trial.fit, one.gain) for one in of._contenders()] == refitted
 
 
 # --- whether a closed loop is searched, and what stays of its rivals --------------------------------------------------

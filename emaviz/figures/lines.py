@@ -18,7 +18,7 @@ from emaviz.figures.theme import envelope, line, plain
 
 Array = NDArray[np.float64]
 Window = tuple[float, float]  # from and to, s
-POINTS = 560  # of a line of a live chart, at most: a part's least and most for each pixel or two of its width
+POINTS = 384  # of a line of a live chart, at most: a part's least and most for each two pixels of its width
 
 
 @dataclass(frozen=True, eq=False)

@@ -124,20 +124,18 @@ class LiveSignals:
                 self._charts[i] = chart, handle
                 self._set_axes(handle, _axes(chart, i == len(self._charts) - 1))
             difference = chart.difference_scale * (mm - rm)
-            every = [difference, chart.scale * rm, chart.scale * mm]
+            frozen = beneath(at(ghost, chart.signal, time), rm)
+            every = [difference, chart.scale * frozen, chart.scale * rm, chart.scale * mm]
             if chart.with_command:
                 every.append(chart.scale * reference["command_rad"][shown])
-            if ghost is not None:
-                every.append(chart.scale * beneath(at(ghost, chart.signal, time), rm))
             # in the middle third of the chart, so that it does not cover the signals
             drawn = envelope(time, every, POINTS)
-            frozen = _NONE if ghost is None else drawn[-1]
-            lines = drawn[2:] if ghost is None else drawn[2:-1]
             most = _FRAME * max(float(np.max(np.abs(difference))), 1e-6)
-            handle.data = (*drawn[:2], frozen, *lines, np.array([-most, most]))
+            frame = np.full(len(drawn[0]), most)
+            frame[0] = -most
+            handle.data = (*drawn, frame)
 
 
-_NONE = np.empty(0)  # of a line that is not there: what a line lacks at its end is not drawn, and not sent
 _EQUIVALENT = ((REFERENCE, "equivalent current of the phases, plant"), (MONITOR, "monitor"))
 
 

@@ -1,11 +1,9 @@
-"""What a slider's change sends to a browser: each chart once, decimated to its pixels."""
+"""What a slider's change sends to a browser: each chart once, decimated to its pixels, in single precision."""
 
 from __future__ import annotations
 
 import pytest
 from support.on_page import wait_until
-
-from emaviz.page.explore.tab import ExploreTab
 
 pytestmark = pytest.mark.browser
 
@@ -16,7 +14,7 @@ DRAWN = """() => { const { chart } = Object.values(window.__viserTestpoints.uplo
            apart: [chart.scales.difference.min, chart.scales.difference.max] }; }"""
 
 
-def test_a_change_sends_each_chart_once_and_no_line_that_is_not_there(browser, app):
+def test_a_change_sends_each_chart_once(browser, app):
     with browser.tab() as page:
         received: list[int] = []
         page.on("websocket", lambda one: one.on("framereceived", lambda data: received.append(len(data))))
@@ -39,16 +37,12 @@ def test_a_change_sends_each_chart_once_and_no_line_that_is_not_there(browser, a
 
         drawn = page.evaluate(DRAWN)
         time, apart, frozen, plant, monitor, command, frame = drawn["values"]
-        assert len(time) == len(apart) == len(plant) == len(monitor) == len(command) > 300
-        assert not frozen and len(frame) == 2
-        assert drawn["apart"][0] <= frame[0] < 2.9 * min(apart) and drawn["apart"][1] >= frame[1] > 2.9 * max(apart)
+        assert len({len(one) for one in drawn["values"]}) == 1 and len(time) > 300
+        assert frozen == plant and len(monitor) == len(command), "it lies unseen beneath"
+        assert drawn["apart"][0] <= min(frame) < 2.9 * min(apart) and drawn["apart"][1] >= max(frame) > 2.9 * max(apart)
         run = app.session.simulation.reference["user_position_rad"]
         assert max(plant) == pytest.approx(1e3 * max(run), rel=1e-6), "no peak is lost"
         assert drawn["y"][0] <= min(plant) and drawn["y"][1] >= max(plant)
 
-        app.screen.post("freeze", lambda: app.tab(ExploreTab).charts._set_ghost(app.session.simulation))
-        wait_until(lambda: len(page.evaluate(DRAWN)["values"][2]) == len(time), 20.0)
-        app.screen.post("freeze", lambda: app.tab(ExploreTab).charts._set_ghost(None))
-        wait_until(lambda: not page.evaluate(DRAWN)["values"][2], 20.0)
         app.session.settings.set_fault(0, 0.0)
         app.session.refresh()

@@ -39,7 +39,7 @@ def page(shared_page):
 
 
 def chart(page, title):
-    return np.array(page.evaluate(CHART, title))
+    return [np.array(line) for line in page.evaluate(CHART, title)]
 
 
 @pytest.fixture(scope="module")

@@ -130,7 +130,7 @@ def test_stop_is_quick_and_keeps_the_result(page, app):
     wait_until(lambda: app.session.settings.iterations == 5000)
     page.get_by_role("button", name="Identify").click()
     wait_until(lambda: app.session.worker.busy)
-    page.get_by_text("of 5000").wait_for(timeout=30_000)
+    page.get_by_text("of 5000").first.wait_for(timeout=30_000)
     page.get_by_role("button", name="Stop").click()
     page.get_by_text("stopped ·").wait_for(timeout=30_000)
     assert not app.session.worker.busy

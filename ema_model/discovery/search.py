@@ -38,7 +38,7 @@ from ema_model.discovery.observed.transmission import transmission_seen
 from ema_model.discovery.observed.two_masses import two_masses_seen
 from ema_model.discovery.refit import Trial, fitted_to_the_end, refitted
 from ema_model.discovery.remaining import at_floor, ratio, within_band
-from ema_model.discovery.result import Candidate
+from ema_model.discovery.result import Added, Candidate
 from ema_model.discovery.scoring import AboutFit, Evident, ScoredTerm, evidence_of_fit, places_of, scored_terms
 from ema_model.discovery.terms import Term, hidden, noise_of, terms_of
 from ema_model.effects import CATALOGUE, catalogue_name, find
@@ -52,6 +52,7 @@ Progress = Callable[[str], None]
 _REFITTED = 4  # Terms of a round that nothing speaks against
 _MOST_REFITTED = 8  # Terms of a round
 _MADE_ANEW = 32  # Terms beside a further model, by what those of the first one tell beside it
+_IDLE = "the error does not fall with it"
 _APART = 0.5  # orders, closer than which two are one
 NO_LIMIT = 100  # of effects
 
@@ -281,7 +282,12 @@ class Search:
         if unknown is not None and not story.named:
             unknown = _with_curve(story, self._curve, unknown, tell)
         story.settle(tell)  # last: beside a settled model any refit falls that only goes back to the sensors' noise
-        return Found(self._first, _still_alike(story, self._rivals), unknown)
+        while story.named and story.ladder[-1].change.kind == "effect" and not _falls(story):
+            self._take_back(story.added[-1], _IDLE)
+            unknown = story.left().explanation
+        first = [replace(one, probability=None) if one.name in self._barred else one for one in self._first]
+        first.sort(key=lambda one: -(one.probability or 0.0))
+        return Found(first, _still_alike(story, self._rivals), unknown)
 
     def _go_to_the_end(self) -> None:
         """Adds, exchanges and takes out what makes the model more probable."""
@@ -373,6 +379,9 @@ class Search:
             self._rivals = [first.trial, *others]
         story.add(first.trial, ties=[trial.candidate.name for trial in others])
         story.finish(self._tell)
+        if not first.trial.faults and not _falls(story):  # fitted to its end, as it did when fitted roughly
+            self._take_back(story.added[-1], _IDLE)
+            return True
         if not first.trial.faults:
             probable = seen.probabilities(contenders, ruled_out)
             story.set_probability(min(1.0, sum(probable[name] for name in as_probable)))
@@ -403,7 +412,7 @@ class Search:
         """Whether the error that is told does not fall: a verdict says no more than its ladder."""
         data, current = self.story.data, self.story.current
         first, last = (floor_ratio(data, one.plant, one.calibration.signals) for one in (current, found))
-        return "" if last < (1.0 - LEAST_FALL) * first else "the error does not fall with it"
+        return "" if last < (1.0 - LEAST_FALL) * first else _IDLE
 
     def _denied(self, one: Contender) -> str:
         """Whether what was held out is far less probable with it."""
@@ -433,12 +442,17 @@ class Search:
         for one in story.added:
             reason = implausible(story.current, one.key) or unsteady(story.data, story.current, one.key)
             if reason and one.name in CATALOGUE:
-                story.refused[one.name] = reason
-                self._barred.add(one.name)
-                story.back_to_before(one.key)
-                self._rivals, self._going = [], True
+                self._take_back(one, reason)
+                self._going = True
                 return True
         return False
+
+    def _take_back(self, one: Added, reason: str) -> None:
+        """Goes back to before an effect, which is not looked at again."""
+        self.story.refused[one.name] = reason
+        self._barred.add(one.name)
+        self._rivals, self._refitted = [], None
+        self.story.back_to_before(one.key)
 
     def _curve_instead(self) -> None:
         """Takes the residual's own curve in place of all effects, where it is more probable than they are together.
@@ -573,6 +587,12 @@ class _Beside:
 
 
 # --- what belongs together --------------------------------------------------------------------------------------------
+
+
+def _falls(story: Story) -> bool:
+    """Whether the error that is told fell with the last step."""
+    before, after = (rung.rmse for rung in story.ladder[-2:])
+    return after < (1.0 - LEAST_FALL) * before
 
 
 def _simplest(named: Sequence[Contender]) -> Contender:

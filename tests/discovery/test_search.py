@@ -150,6 +150,37 @@ def test_what_promises_more_than_the_refitted_is_refitted_too(monkeypatch, again
     assert [(one.trial.fit, one.gain) for one in of._contenders()] == refitted
 
 
+@pytest.mark.parametrize(("falls_to", "kept"), [(2.0, True), (2.999, False)])
+def test_an_effect_whose_error_does_not_fall_in_the_end_is_taken_back_and_not_tried_again(monkeypatch, falls_to, kept):
+    """Of a rough fit it did; a verdict says no more than its ladder."""
+    story = SimpleNamespace(refused={}, added=(), data=None, held=None, current=None, ties=[])
+    story.ladder = [SimpleNamespace(rmse=3.0)]
+
+    def add(trial, ties):
+        story.added = (SimpleNamespace(name=trial.candidate.name, key=trial.candidate.name),)
+        story.ladder.append(SimpleNamespace(rmse=falls_to))
+
+    def back_to_before(key):
+        story.added, story.ladder = (), story.ladder[:1]
+
+    story.add, story.back_to_before = add, back_to_before
+    story.finish = story.set_probability = lambda tell: None
+    of = search.Search(story)
+    trial = Trial(Candidate("friction_zone", 1.0, {}), {"friction_zone": {}}, SimpleNamespace(), 1.0)
+    monkeypatch.setattr(of, "_round", lambda: search.Round(None, None, Evident(0.0, 0.0, 0.0), (), []))
+    known = [search.Contender(trial, 500.0, 500.0, 500.0)]
+    monkeypatch.setattr(of, "_contenders", lambda: [one for one in known if one.trial.candidate.name not in of._barred])
+    monkeypatch.setattr(of, "_spoken_against", lambda one: "")
+    monkeypatch.setattr(of, "_turned_back", lambda contenders: False)
+    monkeypatch.setattr(search, "within_band", lambda data, found: False)
+    of.step()
+    if not kept:
+        assert of._going and story.refused == {"friction_zone": "the error does not fall with it"}
+        of.step()
+        assert not of._going
+    assert bool(story.added) == kept
+
+
 # --- whether a closed loop is searched, and what stays of its rivals --------------------------------------------------
 
 DELAY, COGGING = Candidate("computation_delay", 550.0, {}), Candidate("cogging_torque", 600.0, {})

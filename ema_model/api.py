@@ -78,6 +78,7 @@ _WORDS: dict[Any, str] = {  # of types, as a message has them
     int: "a whole number from 0",  # nothing that is counted or seeds random numbers is negative
     bool: "True or False",
     Actuator: "an actuator, as em.load_actuator gives it",
+    Comparison: "a comparison, as em.compare gives it",
     One: _RECORDING,
     Recordings: f"{_RECORDING}, or a list of them",
     str | os.PathLike[str]: _FILE,
@@ -323,6 +324,7 @@ def discover(
     signals: Sequence[str] | None = None,
     candidates: Sequence[str] | None = None,
     most_effects: int = 100,
+    compared: Comparison | None = None,
     on_progress: Callable[[str], None] | None = None,
     stop: Callable[[], bool] | None = None,
 ) -> Discovery:
@@ -334,6 +336,7 @@ def discover(
     signals: names of signals to fit; current and positions without it.
     candidates: names of the effects to consider; all of `emaviz effects` without it.
     most_effects: how many are added at most.
+    compared: a comparison of the same recordings, as em.compare gives it, on whose calibration this goes on.
     on_progress: takes a text that says what goes on; what it raises ends the discovery.
     stop: is asked as often, once the model is calibrated; where it is true, what was added so far is the answer.
     """
@@ -345,6 +348,7 @@ def discover(
         signals=signals,
         candidates=candidates,
         most_effects=most_effects,
+        compared=compared,
         on_progress=on_progress,
         stop=stop,
     )

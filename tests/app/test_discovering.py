@@ -123,7 +123,7 @@ def test_an_effect_is_removed_as_a_step_of_its_own(fresh):
     fresh.remove("cogging_torque")
     wait_until(lambda: not fresh.running)
     assert not fresh.look.added and fresh.look.steps == 3
-    assert fresh.look.rmse == pytest.approx(calibrated, rel=0.02)
+    assert 0.95 * calibrated < fresh.look.rmse < 1.02 * calibrated, "as before, or in a deeper minimum"
 
 
 @pytest.mark.long

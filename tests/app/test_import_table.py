@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from support.comparison_by_hand import comparison as by_hand
 from support.on_page import choose, wait_until
 
 from ema_model.errors import InputError
@@ -94,6 +95,16 @@ def test_columns_are_drawn_edited_and_used_in_one_table(page, app):
             step._edit(edit)
     step._edit(Edit(number - 1, 3, "sign"))  # of a file that was shown before
     assert step.mapping == before
+
+    compared = app.tab(CompareTab).panel._compared  # of the file before it, which ends meanwhile
+    app.screen.post("compared", lambda: compared(by_hand(("one", "two"))))
+    shown = []
+    app.screen.post("and then", lambda: shown.append(app.tab(CompareTab).result._comparison))
+    wait_until(lambda: shown)
+    wait_until(page.locator(".emaviz-map").is_visible, 10.0)
+    assert shown[0] is not None and step.mapping == before
+    app.screen.post("comparison", app.tab(CompareTab).result.clear)
+    app.screen.post("columns", step.redraw)
     page.get_by_role("button", name="Use these columns").click()
     wait_until(lambda: app.comparing.opened["rig.csv"].measurement is not None)
     app.comparing.job.stop()

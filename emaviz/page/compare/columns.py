@@ -302,7 +302,7 @@ class MappingStep:
         if self._lines is not None:
             self._lines.show(opened)
         self.use.visible = bool(opened.columns)
-        self._draw()
+        self.redraw()
 
     def hide(self) -> None:
         """Closes the step."""
@@ -332,7 +332,7 @@ class MappingStep:
             changed = _changed(entry, edit)
             entries = tuple(changed if one is entry else one for one in opened.mapping.entries)
             self._opened = replace(opened, mapping=replace(opened.mapping, entries=entries))
-        self._draw()
+        self.redraw()
 
     def _with(self, column: str, signal: str) -> ColumnMapping:
         """The mapping with this column as that signal, or as none; who was it before is left aside."""
@@ -350,7 +350,8 @@ class MappingStep:
         order = list(SIGNALS)
         return ColumnMapping(tuple(sorted(others, key=lambda one: order.index(one.signal))), tuple(aside.items()))
 
-    def _draw(self) -> None:
+    def redraw(self) -> None:
+        """As the columns are read now, where a file is at this step."""
         if self._opened is not None:
             self._table.show(self._opened, self._plotted)
             self._preview(self._opened, self._plotted)

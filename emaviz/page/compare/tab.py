@@ -12,6 +12,7 @@ import viser
 from ema_model.actuator.describe import DRIVES
 from ema_model.actuator.keys import KINDS
 from ema_model.actuator.parameters import on_axes
+from ema_model.comparison import Comparison
 from ema_model.errors import InputError
 from ema_model.quantities.axes import KINDS as AXES
 from ema_model.quantities.axes import Axes
@@ -458,7 +459,7 @@ class ComparePanel:
         )
         events.held.connect(lambda: page.screen.post("held out", self._show_held_out))
         events.removed.connect(lambda: page.screen.post("removed", self._removed))
-        events.compared.connect(lambda found: page.screen.post("compared", lambda: result.show(found)))
+        events.compared.connect(lambda found: page.screen.post("compared", lambda: self._compared(found)))
         events.missing.connect(lambda why, by_hand: page.screen.post("missing", lambda: self._missing(why, by_hand)))
         comparing.job.began.connect(lambda _: page.screen.post("compare runs", self._show_running))
         comparing.job.ended.connect(lambda _: page.screen.post("compare runs", self._show_running))
@@ -505,6 +506,11 @@ class ComparePanel:
         if self._comparing.comparison is None:
             self._result.preview(opened)
         self._comparing.asking.ask(by_hand=False)
+
+    def _compared(self, found: Comparison) -> None:
+        """Shows it; the columns that somebody is at, of another file, stay on the screen, with what was changed."""
+        self._result.show(found)
+        self._mapping.redraw()
 
     def _failed(self, what: str, name: str, why: str) -> None:
         """Beside what was asked for; no reason takes it away."""

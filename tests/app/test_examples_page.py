@@ -34,7 +34,7 @@ def stopped(page, app, job):
 def test_the_example_of_discover_is_a_challenge(page, app):
     example(page, "Discover").click()
     wait_until(lambda: app.discovering.running)
-    page.get_by_text("Calibrating the model …", exact=True).wait_for()
+    page.get_by_text("Calibrating the model …", exact=True).first.wait_for()
     assert page.locator(".emaviz-waits:visible").count() == 3, "a picture that moves"
     assert app.discovering.source.chosen == next(iter(app.discovering.source.challenges))
     stopped(page, app, app.discovering.job)

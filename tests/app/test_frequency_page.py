@@ -21,9 +21,9 @@ def page(shared_page):
 def test_a_resonance_is_shown_kept_and_comes_back(page, app, tmp_path):
     tab, folder = app.tab(FrequencyTab), app.comparing.folder
     page.get_by_role("tab", name="Bode", exact=True).click()
-    page.get_by_text("There is no frequency response yet").wait_for()
+    page.get_by_text("There is no frequency response yet").first.wait_for()
     page.get_by_role("button", name="Frequency response").click()
-    page.get_by_text("no measurement is chosen").wait_for()
+    page.get_by_text("no measurement is chosen").first.wait_for()
 
     drive_of(folder.actuators, False)
     write_measurement(flexible_drive(3, 22.0), folder.folder / "sweep.csv")
@@ -33,7 +33,7 @@ def test_a_resonance_is_shown_kept_and_comes_back(page, app, tmp_path):
     wait_until(lambda: "sweep.csv" in app.comparing.opened)
     app.comparing.job.stop()  # which compares by itself what is opened
     page.get_by_role("tab", name="Bode", exact=True).click()
-    page.get_by_text("What Compare has: sweep.csv").wait_for()
+    page.get_by_text("What Compare has: sweep.csv").first.wait_for()
     choose(page, "Output", "User position")
     page.get_by_role("button", name="Frequency response").click()
     wait_until(lambda: tab.analysing.job.error)
@@ -59,7 +59,7 @@ def test_a_resonance_is_shown_kept_and_comes_back(page, app, tmp_path):
     tab.analysing.result = None
     tab.analysing.choose("output", "auto")
     page.get_by_role("button", name="Load session").click()
-    page.get_by_text("Session loaded").wait_for()
+    page.get_by_text("Session loaded").first.wait_for()
     page.get_by_role("tab", name="Bode", exact=True).click()
     page.get_by_text("The measured resonance lies at 38.1").locator("visible=true").first.wait_for()
     assert str(tab.analysing.result) == str(found) and tab.analysing.chosen["output"] == "motor"

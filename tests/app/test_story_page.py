@@ -85,7 +85,7 @@ def test_from_a_foreign_file_to_a_shared_link(page, app, foreign):
     for told in ("probable", "× floor", "mN·m", "order 12", "% of the squared error"):
         assert told in card.inner_text(), told
     assert card.locator("svg circle").count() > 10, "its signature"
-    page.get_by_text("Next: cogging torque").wait_for()
+    page.get_by_text("Next: cogging torque").first.wait_for()
     before = discovering.look.found.ladder[-1]
 
     clicks.click(card.get_by_role("button", name="Add Cogging torque"))

@@ -108,7 +108,7 @@ def test_difference_between_two_cursors(page, explored, clicks):
     a, b = two_cursors(page, clicks)
     true = reading(explored.time_s, explored["current_A"], a, b)
     assert row_of(page, "plant")[2] == pytest.approx(true.difference, rel=1e-3, abs=1e-6)
-    page.get_by_text(f"Δt {b - a:.4g} s").wait_for()
+    page.get_by_text(f"Δt {b - a:.4g} s").first.wait_for()
 
 
 def test_mean_and_rms_of_a_window(page, explored, clicks):
@@ -174,7 +174,7 @@ def test_two_discoveries_side_by_side(page, app, clicks):
     discovering.entries.all.append(replace(first, number=first.number + 1))
     app.screen.post("entries", app.tab(DiscoverTab).panel.show_entries)
     clicks.choose("Beside", discovering.entries.all[-1].words)
-    page.get_by_text("Side by side", exact=True).wait_for()
+    page.get_by_text("Side by side", exact=True).first.wait_for()
     wait_until(lambda: sum("Error after each step" in one for one in page.evaluate(TITLES)) == 3)  # and the shown one's
     for one in discovering.entries.all:
-        page.get_by_text(f"{one.number}. {one.subject}", exact=True).wait_for()
+        page.get_by_text(f"{one.number}. {one.subject}", exact=True).first.wait_for()

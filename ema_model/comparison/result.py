@@ -394,8 +394,9 @@ class CalibrationJson(TypedDict):
     starts: Annotated[
         dict[str, ParameterJson],
         Meta(
-            description="of the recordings: turned N is the motor's offset at the start, faster N its speed's, play N "
-            "where in the backlash it was, lag N by how much later than the positions the current was recorded"
+            description="of the recordings: turned N is the motor's offset at the start, faster N its speed's, pull N "
+            "that of the torque that its drive asked for, play N where in the backlash it was, lag N by how much later "
+            "than the positions the current was recorded"
         ),
     ]
     outside_tolerance: Annotated[list[str], Meta(description="parameters that end at the edge of their tolerance")]

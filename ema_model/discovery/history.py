@@ -257,7 +257,7 @@ class Story:
         return fit(self.data, actuator, found.starts, tell, found.faults)
 
     def finish(self, tell: Progress = lambda text: None) -> None:
-        """Fits the last model to its very end, with intervals, where it was refitted roughly.
+        """Fits the last model to its very end, with intervals, where it was refitted roughly or its floor is another.
 
         How far a model is from its three-phase twin goes with how it moves: where the one before it moved otherwise,
         since it left twice as much or more, the floor is measured anew beside this one.
@@ -268,14 +268,13 @@ class Story:
         fits = [step.fit for step in self.steps[-2:]]
         before, after = (floor_ratio(self.data, one.plant, one.calibration.signals) for one in fits)
         moves_otherwise = before > FAR and after < HALF * before
-        data, held = self.data, self.held
-        if moves_otherwise:
-            data, held = data.beside(last.fit), None if held is None else held.beside(last.fit)
         is_final = last.fit.calibration.is_final
+        data = self.data.beside(last.fit) if moves_otherwise else self.data
         if is_final and data.weighs_as(self.data):
             return
         again = not is_final and (last.rung.change.kind == "fault" or before > FAR)
         found = fitted_to_the_end(data, last.fit, again, tell)  # tell may raise to stop
+        held = self.held.beside(last.fit) if moves_otherwise and self.held is not None else self.held
         self.steps.pop()
         if moves_otherwise:
             self.data, self.held = data, held

@@ -277,7 +277,8 @@ class Search:
         story, tell = self.story, self._tell
         self._go_to_the_end()
         self._curve_instead()
-        story.finish(tell)
+        if not story.current.calibration.is_final:
+            story.finish(tell)
         unknown = story.left().explanation
         if unknown is not None and not story.named:
             unknown = _with_curve(story, self._curve, unknown, tell)
@@ -318,9 +319,8 @@ class Search:
             found: list[Contender] = []
             standing: list[Contender] = []  # those that nothing speaks against
             best = -math.inf
-            while (
-                len(standing) < _REFITTED and len(found) < _MOST_REFITTED and not within_band(story.data, story.current)
-            ):
+            is_told = within_band(story.data, story.current)
+            while not is_told and len(standing) < _REFITTED and len(found) < _MOST_REFITTED:
                 left = [one for one in room[len(found) :] if one.gain > max(WORTH_A_REFIT, best)]
                 chosen = [one for one in left if one.gain > might * left[0].gain][: _REFITTED - len(standing)]
                 if not chosen:

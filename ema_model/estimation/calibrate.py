@@ -19,6 +19,7 @@ from ema_model.estimation.least_squares import descended
 from ema_model.estimation.problem import (
     ECCENTRICITY,
     K_SIGMA,
+    STARTS,
     Problem,
     Unknown,
     physical_limits,
@@ -330,7 +331,7 @@ class Calibration:
         The motor's angle and its place in the play, rad at the motor, its speed, rad/s, and the torque that its drive
         asked for, N·m.
         """
-        found = (self.starts.get(f"{kind} {window}") for kind in ("turned", "play", "faster", "pull"))
+        found = (self.starts.get(f"{kind} {window}") for kind in STARTS)
         turned, play, faster, pull = (0.0 if one is None else one.value for one in found)
         return turned, play, faster, pull
 

@@ -31,6 +31,7 @@ from ema_model.side_by_side import windows
 Array = NDArray[np.float64]
 
 BOUND = 3.0  # σ
+STARTS = ("turned", "play", "faster", "pull")  # kinds of unknowns, in the order in which `Model.signals` takes them
 # 1 σ of each k, and of each part of the eccentricity, about the actuator's own.  A k may be anywhere in [0, 1], so the
 # prior is wide: what recordings do not tell is as the file says rather than anything, what they tell outweighs it.
 K_SIGMA = 0.5
@@ -170,7 +171,7 @@ def starts_of(model: Model, floors: Sequence[Floor], *, worn: bool, exact: bool 
             if not any(name in window.measured for name in POSITIONS):
                 continue
         if has_integral and "current_A" in floor.noise:
-            pull = model.actuator.controller.torque_constant_Nm_A * floor.noise["current_A"] * samples
+            pull = controller.torque_constant_Nm_A * floor.noise["current_A"] * samples
             found.append(Unknown(f"pull {i}", 0.0, pull, kind="pull", place=i))
         motor = floor.noise.get("motor_position_rad", half_play) * samples
         user = floor.noise.get("user_position_rad", tau * widest) * samples / tau
@@ -407,8 +408,7 @@ class Problem:
     def _places(self, window: int) -> dict[str, int]:
         """Of the kinds that are not all windows' alike: where a window's own stands."""
         recording = self.model.windows[window].recording
-        own = dict.fromkeys(("turned", "play", "faster", "pull"), window)
-        return {**own, "load": recording, "lag": recording}
+        return {**dict.fromkeys(STARTS, window), "load": recording, "lag": recording}
 
     def parts(self) -> list[tuple[int, str, slice]]:
         """Where the residuals of each window's signals stand: window, signal, rows."""
@@ -480,7 +480,7 @@ class Problem:
         if "load" in own:
             effects = {**effects, LOAD: {"torque_Nm": own["load"]}}
         actuator = self.model.actuator.varied(self.parameters(x))
-        turned, play, faster, pull = (own.get(kind, 0.0) for kind in ("turned", "play", "faster", "pull"))
+        turned, play, faster, pull = (own.get(kind, 0.0) for kind in STARTS)
         return Rig(actuator, self.k(x), turned, play, faster, pull, effects)
 
 

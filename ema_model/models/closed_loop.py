@@ -115,12 +115,7 @@ class ClosedLoop:
             return {}
         k = actuator.k if k is None else k
         load, others = _load_and_others(window, self.effects)
-        run = Run(
-            _command(window),
-            duration_s=len(window.command) * window.step_s,
-            sample_rate_Hz=1.0 / (window.steps_per_sample * window.step_s),
-            load_torque_Nm=float(load),
-        )
+        run = _run(window, float(load))
         shown = simulate_reference(
             run,
             actuator,
@@ -153,12 +148,11 @@ class ClosedLoop:
         if not actuator.has_reference_model:
             return {}
         load, others = _load_and_others(window, effects)
-        rate_Hz = 1.0 / (window.steps_per_sample * window.step_s)
-        samples = len(window.command) // window.steps_per_sample
+        run = _run(window)
         shown = simulate_references(
-            _command(window),
-            samples,
-            rate_Hz,
+            run.command,
+            run.samples,
+            run.sample_rate_Hz,
             actuator,
             k,
             others,
@@ -168,7 +162,7 @@ class ClosedLoop:
             start_play_rad=window.play_rad + np.asarray(play_rad),
             start_integral_Nm=window.integral_Nm(actuator, k, turned_rad, play_rad, pull_Nm),
             start_time_s=window.begins_s,
-            before=_before(window, Run(_command(window), samples / rate_Hz, rate_Hz)),
+            before=_before(window, run),
         )
         return self._measured(window, actuator, shown)
 
@@ -283,9 +277,14 @@ class ClosedLoop:
         return {name: later(values, late, block_s) for name, values in shown.items()}
 
 
-def _command(window: LoopWindow) -> Recorded:
-    """What a window's model is told, at its steps."""
-    return Recorded(np.arange(len(window.command)) * window.step_s, window.command)
+def _run(window: LoopWindow, load_Nm: float = 0.0) -> Run:
+    """A window as a run of the Reference Model, under a constant load."""
+    return Run(
+        Recorded(np.arange(len(window.command)) * window.step_s, window.command),
+        duration_s=len(window.command) * window.step_s,
+        sample_rate_Hz=1.0 / (window.steps_per_sample * window.step_s),
+        load_torque_Nm=load_Nm,
+    )
 
 
 def _straight(command: Array, steps: int) -> Array:

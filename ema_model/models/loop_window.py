@@ -215,11 +215,13 @@ def _before(measurement: Measurement, actuator: Actuator, run: slice, steps: int
         return np.zeros(0)
     whole = next(one for one in measurement.runs if one.start <= run.start < one.stop)
     first = max(whole.start, run.start - round(_FOLLOWED_S / measurement.sample_period_s))
+    if first == run.start:
+        return np.zeros(0)
     lead, last = (run.start - first) * steps, min(whole.stop, run.start + _BESIDE)
     return _put_in(measurement, "command_rad", first, last, lead, step_s, actuator.sensors.delay_s)
 
 
-@lru_cache(maxsize=8)  # every model of a discovery is put beside the same recordings
+@lru_cache(maxsize=64)  # every model of a discovery is put beside the same windows, and what came before each
 def _put_in(
     measurement: Measurement, name: str, first: int, last: int, steps: int, step_s: float, delay_s: float
 ) -> Array:
@@ -266,13 +268,11 @@ def _slope(measurement: Measurement, position: Array, at: int, least_s: float = 
 
 
 def _line(time_s: Array, position: Array) -> tuple[float, float]:
-    """The slope of a position, and its standard error."""
-    if len(time_s) < 3:
+    """The slope of a position, and its standard error; 0 of too few samples."""
+    if len(time_s) < 4:
         return 0.0, math.inf
-    place = time_s - time_s.mean()
-    slope = float(place @ position / (place @ place))
-    left = position - position.mean() - slope * place
-    return slope, math.sqrt(float(left @ left) / (len(place) - 2) / float(place @ place))
+    (slope, _), covariance = np.polyfit(time_s, position, 1, cov=True)
+    return float(slope), math.sqrt(covariance[0, 0])
 
 
 def _current(measurement: Measurement, actuator: Actuator, at: int, speed: float) -> float:

@@ -1168,7 +1168,15 @@ def _times(first: Rung, last: Rung) -> str:
     fall = f"{number(first.rmse)} to {number(last.rmse)} times the floor"
     if first.holdout_rmse is None or last.holdout_rmse is None:
         return fall
-    unseen = f"from {number(first.holdout_rmse)} to {number(last.holdout_rmse)} times"
     if last.holdout_rmse <= BAND and abs(last.holdout_rmse - first.holdout_rmse) < _HARDLY * first.holdout_rmse:
+        unseen = f"from {number(first.holdout_rmse)} to {number(last.holdout_rmse)} times"
         return f"{fall}; what was not fitted hardly shows it ({unseen})"
-    return f"{fall}, and on what was not fitted {unseen}"
+    return f"{fall}{on_unseen(first.holdout_rmse, last.holdout_rmse)} times"
+
+
+def on_unseen(before: float, after: float) -> str:
+    """', and on what was not fitted from 4.35 to 1.02', behind how the error falls; else that it does not there."""
+    told = f"from {number(before)} to {number(after)}"
+    if after < before:
+        return f", and on what was not fitted {told}"
+    return f"; on what was not fitted it does not fall, {told}"

@@ -165,7 +165,7 @@ def _fall(one: Added) -> str:
     text = f"The error falls from {number(one.rmse_before)} to {number(one.rmse_after)} times the floor"
     if one.holdout_before is None or one.holdout_after is None:
         return f"{text}; nothing was held out."
-    return f"{text}, and on what was not fitted from {number(one.holdout_before)} to {number(one.holdout_after)}."
+    return f"{text}{words.on_unseen(one.holdout_before, one.holdout_after)}."
 
 
 # --- what is missing and no effect of the library explains, as a curve ------------------------------------------------

@@ -145,3 +145,8 @@ def test_a_file_without_a_controller_may_say_its_pole_pairs(tmp_path):
         encoding="utf-8",
     )
     assert load_actuator(tmp_path / "joint.toml").motor.pole_pairs == 7.0
+
+
+def test_an_error_that_does_not_fall_on_what_was_not_fitted_is_not_said_to_fall():
+    assert words.on_unseen(4.35, 1.02) == ", and on what was not fitted from 4.35 to 1.02"
+    assert words.on_unseen(2.9, 2.93) == "; on what was not fitted it does not fall, from 2.90 to 2.93"

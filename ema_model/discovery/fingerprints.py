@@ -170,9 +170,12 @@ def _gentler(effect: Effect, settings: dict[str, float], size: float, error: flo
 
 
 def may_act(name: str, actuator: Actuator) -> bool:
-    """Whether an effect is of something that is there: of a drive only where its controller is simulated."""
+    """Whether an effect is of something that is there: of a drive only where its controller is simulated.
+
+    One that a fault stands for is not looked for beside the faults.
+    """
     effect = find(name)
-    if not effect.has_part(actuator.axes):
+    if not effect.has_part(actuator.axes) or (effect.fault and actuator.has_reference_model):
         return False
     kinds = actuator.controller.kind, actuator.inverter.kind
     places = {function.__name__ for function in effect.places}

@@ -140,7 +140,7 @@ def disagreement(data: Data, found: Fit, key: str) -> Disagreement | None:
 def parts_of(data: Data, found: Fit) -> list[NDArray[np.bool_]]:
     """Rows of a fit's residual by recording; by halves of its time where there is but one."""
     rows = list(signals_of(data, found.plant))
-    windows = [window for window in found.plant.windows for name in data.signals if name in window.measured]
+    windows = [window for window in found.plant.windows for _ in data.fitted(window.measured)]
     label = np.empty(len(found.residual), np.intp)
     for (_, at), window in zip(rows, windows):
         label[at] = window.recording

@@ -21,6 +21,8 @@ _RECENTRED = 3  # times that a refit begins anew from where its first guess held
 _HELD_BACK = 2.0  # σ of that guess, from which on it did
 _FOUND = (*ANGLES, "order")  # what no guess holds back: any angle is as likely, a pitch is as exact as the travel
 _UNMOVED = 1.0  # σ
+_STEP = 0.01  # of a parameter, by which it is seen whether it moves anything; its unit where it is 0
+_SAME = 1e-9  # what two of the same signal may differ by
 _ALIKE = 0.9  # cosine of two parameters' columns, from which on they do the same
 _FAINT = 0.1  # of the suggested strength, from which a fit that went astray begins anew
 
@@ -134,16 +136,31 @@ def stands_for(before: Fit, trial: Trial) -> str:
 
     A parameter that is free, and stays where the file has it, is not what is missing, nor is one that moves the signals
     otherwise, though a reading alone would not tell the two apart: a constant load moves the axis, the bias of a
-    logger's current does not.
+    logger's current does not, and nothing at all where no current was logged.
     """
     name = trial.candidate.name
     path = find(name).duplicates
     if not path:
         return ""
     free = before.calibration.parameters.get(path)
+    if free is None and not _is_seen(before, path):
+        return ""
     if free is not None and not free.at_bound and abs(free.z) < _UNMOVED:
         return ""
     return path if _moves_alike(trial.fit, path, f"effects.{name}.{find(name).parameters[0].name}") else ""
+
+
+def _is_seen(found: Fit, path: str) -> bool:
+    """Whether a parameter moves anything that was measured."""
+    calibration = found.calibration
+    value = calibration.actuator.value(path)
+    moved = calibration.actuator.with_values({path: value + (_STEP * abs(value) or _STEP)})
+    for i, window in enumerate(found.plant.windows):
+        shown = found.plant.signals(i, moved, calibration.k, *calibration.start_of(i))
+        both = [(shown[name], calibration.signals[i][name]) for name in window.measured if name in shown]
+        if any(not np.allclose(one, other, rtol=_SAME, atol=0.0) for one, other in both):
+            return True
+    return False
 
 
 def _moves_alike(found: Fit, *paths: str) -> bool:

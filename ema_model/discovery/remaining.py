@@ -55,7 +55,7 @@ class Left:
         if at_floor(self.data, self.found):
             return []
         residuals = residuals_left(self.data, self.found)
-        fitted = [name for name in self.data.signals if name in residuals.values]
+        fitted = list(self.data.fitted(residuals.values))
         names = [one.name for one in self.data.measurements]
         return events(residuals, fitted, names, self.found.calibration.actuator)
 
@@ -91,7 +91,7 @@ def lasts(data: Data, found: Fit) -> bool:
     fitted = found.calibration.signals
     known: list[dict[str, Array]] = [{} for _ in fitted]
     residuals = residuals_of(found.plant, data.told_in, fitted, known, found.calibration.actuator)
-    return bool(lasting(residuals, [name for name in data.signals if name in residuals.values]))
+    return bool(lasting(residuals, list(data.fitted(residuals.values))))
 
 
 @lru_cache(maxsize=4)  # a search asks before and after it has looked for the next effect

@@ -186,9 +186,8 @@ def look_at(story: Story, found: Discovery, assessment: Assessment | None, first
     known: list[dict[str, Array]] = [{} for _ in fit.plant.windows]
     weights, sigmas = [], []
     for window, one in zip(fit.plant.windows, data.floors):
-        names = [name for name in data.signals if name in window.measured]
-        weights.append({name: data.signals[name] for name in names})
-        sigmas.append({name: np.broadcast_to(one.fit_sigma(name), (window.blocks,)) for name in names})
+        weights.append(data.fitted(window.measured))
+        sigmas.append({name: np.broadcast_to(one.fit_sigma(name), (window.blocks,)) for name in weights[-1]})
     return Look(
         found=found,
         added=story.added,

@@ -57,10 +57,9 @@ def signals_of(data: Data, plant: Model) -> Iterator[tuple[str, slice]]:
     """The fitted signals of each window with their rows in a residual, in its order."""
     row = 0
     for window in plant.windows:
-        for name in data.signals:
-            if name in window.measured:
-                yield name, slice(row, row + window.blocks)
-                row += window.blocks
+        for name in data.fitted(window.measured):
+            yield name, slice(row, row + window.blocks)
+            row += window.blocks
 
 
 @lru_cache(maxsize=32)
@@ -102,7 +101,7 @@ def with_intervals(data: Data, found: Fit) -> Calibration:
 
 def _by_pieces(data: Data, found: Fit) -> Array:
     """Variance of each unknown, in σ² of its tolerance, from how pieces of the windows pull at it: (unknowns,)."""
-    windows = [i for i, one in enumerate(found.plant.windows) for name in data.signals if name in one.measured]
+    windows = [i for i, one in enumerate(found.plant.windows) for _ in data.fitted(one.measured)]
     parts = [(window, rows) for window, (_, rows) in zip(windows, signals_of(data, found.plant))]
     calibration = found.calibration
     return np.max(

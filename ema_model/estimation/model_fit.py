@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Container, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 
@@ -15,6 +15,7 @@ from ema_model.effects import find
 from ema_model.effects.effect import ANGLES
 from ema_model.estimation import Calibration, Floor, after_fit, calibrate, default_free, floor, of_unseen, taken_up
 from ema_model.estimation.floor import band, least, spread, twin_error
+from ema_model.estimation.problem import fitted_signals
 from ema_model.models import Model, model_for
 from ema_model.models.model import Signals
 from ema_model.recordings import Measurement
@@ -60,7 +61,11 @@ class Data:
     @property
     def _pooled(self) -> Sequence[Collection[str]]:
         """Signals of which the error is pooled, by window."""
-        return [one.noise.keys() & self.signals.keys() for one in self.told_in]
+        return [self.fitted(one.noise) for one in self.told_in]
+
+    def fitted(self, measured: Container[str]) -> dict[str, float]:
+        """The signals to fit of those that a window has, with their weights; a speed where no position was logged."""
+        return fitted_signals(self.signals, measured)
 
     def plant(self, actuator: Actuator) -> Model:
         """The recordings beside this actuator's model."""
@@ -71,8 +76,7 @@ class Data:
         parts = [
             (signals[name], weight / one.fit_sigma(name))
             for window, one, signals in zip(plant.windows, self.floors, shown)
-            for name, weight in self.signals.items()
-            if name in window.measured
+            for name, weight in self.fitted(window.measured).items()
         ]
         ends = np.cumsum([0, *(signal.shape[-1] for signal, _ in parts)])
         told = np.empty((*parts[0][0].shape[:-1], ends[-1]))  # of many lanes it is large, and is written once
@@ -260,9 +264,8 @@ def rms_by_signal(data: Data, plant: Model, shown: Sequence[Mapping[str, Array]]
     """rms of model − measurement, in the signals' units."""
     parts: dict[str, list[Array]] = {}
     for window, signals in zip(plant.windows, shown):
-        for name in data.signals:
-            if name in window.measured:
-                parts.setdefault(name, []).append(signals[name] - window.measured[name])
+        for name in data.fitted(window.measured):
+            parts.setdefault(name, []).append(signals[name] - window.measured[name])
     return {name: float(np.sqrt(np.mean(np.concatenate(part) ** 2))) for name, part in parts.items()}
 
 
@@ -293,8 +296,8 @@ def floor_ratio(
     each = [
         (((signals[name] - other[name]) / one.sigma(name)) ** 2, one.counts)
         for window, one, signals, other in zip(plant.windows, data.told_in, shown, others)
-        for name in data.signals
-        if name in window.measured and recording in (None, window.recording)
+        for name in data.fitted(window.measured)
+        if recording in (None, window.recording)
     ]
     squared, counts = (np.concatenate(parts) for parts in zip(*each))
     return float(np.sqrt(np.average(squared, weights=counts)))

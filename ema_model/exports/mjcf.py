@@ -40,6 +40,7 @@ HELD = {  # effects that have a form in MJCF
     "cogging_torque": "the dcmotor's cogging",
     "constant_load": "the joint's spring",
     "demagnetisation": "the motor constant",
+    "dry_friction": "the joint's frictionloss",
     "goal_delay": "the actuator's delay",
     "hinge_moment": "the joint's spring",
     "inertia_error": "the armature",
@@ -114,7 +115,8 @@ def joint_of(actuator: Actuator, rows: Mapping[str, float]) -> Joint:
     steady = of("hinge_moment", "offset_Nm") + of("constant_load", "torque_Nm")
     if stiffness == 0.0 and steady != 0.0:
         stiffness = _SOFT * abs(steady)
-    dynamic, static = rows["dynamic_friction"], max(rows["static_friction"], rows["dynamic_friction"])
+    dynamic = max(rows["dynamic_friction"] + of("dry_friction", "torque_Nm"), 0.0)
+    static = max(rows["static_friction"], dynamic)
     lugre = _lugre(actuator, effects, dynamic, static, inertia, tau)
     cogging = None
     if "cogging_torque" in effects:

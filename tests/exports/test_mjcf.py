@@ -52,6 +52,7 @@ def test_what_mujoco_can_hold_moves_as_ours(name, most):
     ("effect", "settings"),
     [
         ("viscous_friction", {"coefficient_Nms_rad": 0.01}),
+        ("dry_friction", {"torque_Nm": 0.05}),
         ("hinge_moment", {"stiffness_Nm_rad": 0.3, "offset_Nm": 0.05}),
         ("constant_load", {"torque_Nm": 0.1}),
         ("cogging_torque", {"amplitude_Nm": 0.02, "order": 5.0, "phase_rad": 0.4}),

@@ -1,6 +1,6 @@
 """A DC gearmotor on a bench: duty in, speed out; by hand, of none of the product's code.
 
-R i = d V − k ω (or L di/dt with an inductance), J dω/dt = k i − B ω − C sgn ω, which holds the motor at rest.
+R i = d V − k ω (or L di/dt with an inductance), J dω/dt = k i − B ω − T_0 − C sgn ω, which holds the motor at rest.
 """
 
 from __future__ import annotations
@@ -24,6 +24,7 @@ class Bench:
     inertia_kgm2: float = 1.6e-6
     viscous_Nms_rad: float = 1.5e-6
     dry_Nm: float = 1.1e-3
+    load_Nm: float = 0.0
     late_s: float = 0.0  # by which a duty takes effect
 
     def run(self, time_s: Array, duty: Array, speed_rad_s: float = 0.0, substeps: int = 20) -> tuple[Array, Array]:
@@ -42,7 +43,7 @@ class Bench:
                     current += dt / self.inductance_H * rise
                 else:
                     current = (volts - self.torque_constant_Nm_A * omega) / self.resistance_Ohm
-                pull = self.torque_constant_Nm_A * current - self.viscous_Nms_rad * omega
+                pull = self.torque_constant_Nm_A * current - self.viscous_Nms_rad * omega - self.load_Nm
                 if omega == 0.0:
                     pull = np.sign(pull) * max(0.0, abs(pull) - self.dry_Nm)
                 else:

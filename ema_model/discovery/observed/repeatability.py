@@ -47,7 +47,7 @@ def with_divergence(data: Data, found: Fit) -> tuple[Data, float]:
             for name in one.model
         }
         floors.append(one.beside(replace(one, model=apart)))
-        name = next((name for name in data.signals if name in apart), None)
+        name = next(iter(data.fitted(apart)), None)
         if name is not None:
             size = float(np.sqrt(np.mean(window.measured[name] ** 2)))
             lost.append(apart[name] > max(one.noise[name], _IN_PROPORTION * size))

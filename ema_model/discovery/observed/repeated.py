@@ -48,7 +48,7 @@ def repeated(data: Data, held: Data | None, actuator: Actuator) -> Repeated | No
         for (first, of_first), (second, of_second) in twice
         for one in cut[id(of_first)]
         for other in cut[id(of_second)]
-        if one[0] is first and other[0] is second and (pair := _apart(one, other, list(data.signals))) is not None
+        if one[0] is first and other[0] is second and (pair := _apart(one, other, data)) is not None
     ]
     return max(found, key=lambda pair: pair.apart, default=None)
 
@@ -61,12 +61,12 @@ def _parts(data: Data, actuator: Actuator) -> Sequence[_Part]:
     return [(data.measurements[window.recording], window, floor) for window, floor in zip(windows, data.floors)]
 
 
-def _apart(one: _Part, other: _Part, names: list[str]) -> Repeated | None:
+def _apart(one: _Part, other: _Part, data: Data) -> Repeated | None:
     (first, its, floor), (second, theirs, _) = one, other
     if its.first != theirs.first:
         return None
     blocks = min(its.blocks, theirs.blocks)
-    known = [name for name in names if name in its.measured and name in theirs.measured]
+    known = data.fitted(its.measured.keys() & theirs.measured.keys())
     if not known:
         return None
     ours, others = its.measured, theirs.measured

@@ -235,7 +235,7 @@ def simulated(plant: Plant, drive: Drive, command: Moves, rate_Hz: float, durati
             duty = wanted
             flows = (duty * plant.supply - kt * omega) / plant.resistance
         elif plant.kind == "joint":
-            flows = (plant.effects["servo"]["kp"] * (wanted - q) - plant.effects["servo"]["kv"] * omega) / kt
+            flows = data.actuator_force[0] / kt  # what its own servo, which may have a delayed goal, gave in the last step
         else:
             flows = wanted
         if plant.kind in ("servo", "open_voltage"):
@@ -246,7 +246,7 @@ def simulated(plant: Plant, drive: Drive, command: Moves, rate_Hz: float, durati
             torque = kt * flows
             ctrl[0] = torque / (1.0 + saturates * abs(flows))
         if act.any:
-            act(data, first + i * STEP_S, theta, omega, flows, q)
+            act(data, first + i * STEP_S, theta, omega, flows / (1.0 + saturates * abs(flows)), q)
         moment = i - before
         if moment >= 0 and moment % sub == 0:
             row = kept[moment // sub]

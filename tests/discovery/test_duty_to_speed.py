@@ -43,7 +43,10 @@ def test_nothing_is_named_where_nothing_is_missing(tmp_path):
 
 @pytest.mark.parametrize(
     ("hidden", "name", "value"),
-    [({"load_Nm": 8e-4}, "constant_load", 8e-4), ({"dry_Nm": 2.6e-3}, "dry_friction", 2.6e-3 - 1.05e-3)],
+    [
+        pytest.param({"load_Nm": 8e-4}, "constant_load", 8e-4, marks=pytest.mark.long),
+        ({"dry_Nm": 2.6e-3}, "dry_friction", 2.6e-3 - 1.05e-3),
+    ],
 )
 def test_what_is_missing_is_named_with_its_size(tmp_path, hidden, name, value):
     found = found_of(tmp_path, Bench(**hidden))

@@ -235,7 +235,7 @@ def simulated(plant: Plant, drive: Drive, command: Moves, rate_Hz: float, durati
             duty = wanted
             flows = (duty * plant.supply - kt * omega) / plant.resistance
         elif plant.kind == "joint":
-            flows = data.actuator_force[0] / kt  # what its own servo, which may have a delayed goal, gave in the last step
+            flows = data.actuator_force[0] / kt  # as its own servo, its goal maybe delayed, gave last
         else:
             flows = wanted
         if plant.kind in ("servo", "open_voltage"):

@@ -25,6 +25,11 @@ LARGEST_GROUP = 3
 # Of the error that is told, that must fall with an effect: a verdict says no more than its ladder (MODEL §6).
 LEAST_FALL = 0.01
 
+# Values that what a model lacks counts as in each recording, however long that is: it is no noise that is drawn anew
+# with each sample, and a wrong Term of the same motion takes a share of it, too (Miller and Dunson, J. Am. Stat. Assoc.
+# 114, 2019).  Beside a rest far above the floor, what takes a seventh of the error in three recordings is then named.
+SHAPES = 20.0
+
 # --- what speaks against an effect that is probable -------------------------------------------------------------------
 
 # Probability that an effect's parameters differ so much between parts of the recordings by chance, below which they

@@ -21,8 +21,8 @@ Array = NDArray[np.float64]
 Lane = tuple[Effect, dict[str, float]]
 Ranges = Mapping[str, tuple[float, float]]  # by variable
 
-_FAR = 30.0  # times what there is to explain
-_ATTEMPTS = 3
+_FAR = 10.0  # times what there is to explain
+_ATTEMPTS = 6
 _LONGEST_STEP_S = 2e-5  # at which no score differs in its first three digits from that at 1e-5
 _BACKWARD = 0.05  # of the top speed, that both directions must reach for motion to count as both ways
 _DIVERGED = 1e100  # floors, from which on a change has no meaning: its square would overflow

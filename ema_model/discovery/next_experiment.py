@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ema_model.actuator import Actuator
+from ema_model.actuator.parameters import WITHOUT_LOOP
 from ema_model.commands import command
 from ema_model.discovery.refit import Trial
 from ema_model.discovery.result import Experiment
@@ -43,7 +44,7 @@ def next_experiment(data: Data, one: Trial, other: Trial) -> Experiment | None:
     None where no allowed experiment does, or where the actuator cannot be simulated.
     """
     first, second, rivals = one.fit, other.fit, (one.candidate.name, other.candidate.name)
-    if not first.plant.simulates_commands:
+    if first.calibration.actuator.controller.kind in WITHOUT_LOOP:
         return None
     further = [name for name in SIGNALS[2:] if name not in data.signals or not _is_measured(first, name)]
     for signals in (dict(data.signals), {**data.signals, **dict.fromkeys(further, 1.0)}):

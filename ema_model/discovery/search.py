@@ -14,6 +14,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ema_model.comparison.explain import Explanation
+from ema_model.comparison.verdict import most_of_floor
 from ema_model.discovery.contradictions import contradictions, goes_by_angle, put_right
 from ema_model.discovery.criteria import (
     ANY_MISSING,
@@ -25,6 +26,7 @@ from ema_model.discovery.criteria import (
     LOOP_TOLD,
     MIGHT,
     NAMED,
+    SHAPES,
     TOLD_WELL,
     WORTH_A_REFIT,
 )
@@ -49,10 +51,12 @@ from ema_model.side_by_side import fits
 
 Progress = Callable[[str], None]
 
-_REFITTED = 4  # Terms of a round that nothing speaks against
+_REFITTED = 4  # Terms of a round that keep what the algebra promised of them
 _MOST_REFITTED = 8  # Terms of a round
 _MADE_ANEW = 32  # Terms beside a further model, by what those of the first one tell beside it
+_SLIGHT = "beside what is left it tells too little"
 _IDLE = "the error does not fall with it"
+_TINY = 1e-9
 _APART = 0.5  # orders, closer than which two are one
 NO_LIMIT = 100  # of effects
 
@@ -292,7 +296,7 @@ class Search:
 
     def _go_to_the_end(self) -> None:
         """Adds, exchanges and takes out what makes the model more probable."""
-        while self._going or self._exchanged() or self._doubtful():
+        while self._going or self._exchanged() or self._doubtful() or self._slight():
             while self._going:
                 self.step()
 
@@ -317,7 +321,7 @@ class Search:
             room = [one for one in self._open(seen) if one.term.fingerprint is None or not is_full]
             might = 0.0 if self._is_far() else MIGHT  # so far off, what is straight tells little
             found: list[Contender] = []
-            standing: list[Contender] = []  # those that nothing speaks against
+            standing: list[Contender] = []  # those that are named, if they are the best
             best = -math.inf
             is_told = within_band(story.data, story.current)
             while not is_told and len(standing) < _REFITTED and len(found) < _MOST_REFITTED:
@@ -325,13 +329,23 @@ class Search:
                 chosen = [one for one in left if one.gain > might * left[0].gain][: _REFITTED - len(standing)]
                 if not chosen:
                     break
-                trials = fits(self._refit, chosen, self._tell)
-                found += [seen.contender(story.data, story.held, one, trial) for one, trial in zip(chosen, trials)]
-                standing = [one for one in found if not (self._is_beyond(one) and self._objection(one))]
+                found += self._refits(chosen)
+                standing = [one for one in found if self._is_beyond(one) and not self._objection(one)]
                 # What promises more than this is refitted, too.
                 best = max((one.gain for one in standing), default=-math.inf)
+            if standing:  # what a short travel shows of it, or a narrow range, may be all that there is
+                trial = max(standing, key=lambda one: one.gain).trial
+                tried = {one.trial.candidate.name for one in found}
+                terms = () if trial.faults else find(trial.candidate.name).terms
+                found += self._refits([one for one in room if one.candidate.name in {*terms} - tried])
             self._refitted = seen, sorted(found, key=lambda one: -one.gain)
         return self._refitted[1]
+
+    def _refits(self, chosen: Sequence[ScoredTerm]) -> list[Contender]:
+        """Terms in the last model, each refitted."""
+        story, trials = self.story, fits(self._refit, chosen, self._tell)
+        seen = self._round()
+        return [seen.contender(story.data, story.held, one, trial) for one, trial in zip(chosen, trials)]
 
     def _is_beyond(self, one: Contender | ScoredTerm) -> bool:
         """Whether a Term is so probable that it is named, if nothing speaks against it."""
@@ -444,6 +458,16 @@ class Search:
             if reason and one.name in CATALOGUE:
                 self._take_back(one, reason)
                 self._going = True
+                return True
+        return False
+
+    def _slight(self) -> bool:
+        """Goes back to before an effect that tells too little beside what is left, however long that was recorded."""
+        story = self.story
+        prior = self._round().prior
+        for one in story.added:
+            if one.name in CATALOGUE and _shapes_told(story, one) + prior < NAMED:
+                self._take_back(one, _SLIGHT)  # what is less probable beside the same model tells no more
                 return True
         return False
 
@@ -587,6 +611,27 @@ class _Beside:
 
 
 # --- what belongs together --------------------------------------------------------------------------------------------
+
+
+def _shapes_told(story: Story, one: Added) -> float:
+    """The most that an effect may add to the logarithm of the evidence, beside what the last model leaves.
+
+    What is left beyond the floor counts as `SHAPES` values of each recording; at the floor there is no such limit.
+    """
+    last, most = story.ladder[-1], most_of_floor(story.data.floor_spread)
+    beyond = 1.0 - (most / last.rmse) ** 2
+    if beyond <= 0.0:
+        return math.inf
+    told = len(story.data.measurements) * _fall(one.rmse_before, one.rmse_after, last.rmse)
+    before, after, left = one.holdout_before, one.holdout_after, last.holdout_rmse
+    if story.held is not None and before is not None and after is not None and left is not None:
+        told += len(story.held.measurements) * _fall(before, after, left)
+    return 0.5 * SHAPES * told / beyond
+
+
+def _fall(before: float, after: float, left: float) -> float:
+    """How much more of an error there would be without what made it fall, beside what is left: as a logarithm."""
+    return math.log(max(_TINY, 1.0 + (before**2 - after**2) / left**2))
 
 
 def _falls(story: Story) -> bool:

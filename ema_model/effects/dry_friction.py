@@ -9,7 +9,7 @@ from ema_model.physics.jit import scalar
 @scalar
 def moving_friction(level, static, omega, motor_torque, drag, active, load, gear, theta, user, time, more):
     """T_d + T, and no less than none; at rest as much holds where it is more than the static friction."""
-    return max(level + more, 0.0)
+    return max(level + more, min(level, 0.0))
 
 
 EFFECT = Effect(

@@ -44,5 +44,6 @@ EFFECT = Effect(
     against="motor_speed",
     mistaken_for="viscous friction, a zone of friction where the axis goes back and forth",
     family="mechanics",
+    terms=("dry_friction",),
     by_direction=True,
 )

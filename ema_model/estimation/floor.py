@@ -137,11 +137,12 @@ class Floor:
     allowed: Mapping[str, Array] = field(default_factory=dict)  # of `model`, what need not be there, (blocks,) each
     alike: float = 1.0  # over how many blocks the noise stays alike
     exact: frozenset[str] = frozenset()  # signals whose noise is known, and not estimated
+    turning: Mapping[str, Array] = field(default_factory=dict)  # of a filtered motion, (blocks,); told, not weighed by
     even: bool = False  # a fit counts the noise of all blocks alike: far from the floor it is no reading's error
 
     def sigma(self, signal: str) -> Array:
         """Both together, (blocks,); once fitted, what a true model leaves: `left` in place of `model`."""
-        noise = np.hypot(self.white_part(signal), self._held(signal))
+        noise = np.hypot(np.hypot(self.white_part(signal), self._held(signal)), self.turning.get(signal, 0.0))
         if signal not in self.left:
             return np.hypot(noise, self.model[signal])
         return np.hypot(np.hypot(noise, self.beating.get(signal, 0.0)), self.left[signal])
@@ -221,6 +222,7 @@ def floor(
         repeats_of(window, noise),
         window.block_s,
         beating=window.beating,
+        turning={name: values for name, values in model.turning(place, k).items() if name in noise},
         held_s=window.held_s,
         samples=window.samples_per_block,
         allowed=window.allowed,

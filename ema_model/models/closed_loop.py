@@ -187,6 +187,10 @@ class ClosedLoop:
         now, then = (self._simulated(one, k=k) for one in (window, later))
         return {name: then[name][0] - now[name][0] for name in now}
 
+    def turning(self, place: int, k: ArrayLike | None = None) -> Signals:
+        """Nothing: the motion is the model's own."""
+        return {}
+
     def between_samples(self, place: int, k: ArrayLike | None = None) -> Signals:
         """As in `Model`."""
         window = self.windows[place]

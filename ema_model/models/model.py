@@ -131,3 +131,7 @@ class Model(Protocol):
     def between_samples(self, place: int, k: ArrayLike | None = None) -> Signals:
         """What changes if the command goes straight between samples, (blocks,) each; empty where it is known to."""
         ...
+
+    def turning(self, place: int, k: ArrayLike | None = None) -> Signals:
+        """What the model is off by where a measured motion turns round, (blocks,) each; empty of a simulated one."""
+        ...

@@ -39,7 +39,7 @@ def test_where_nothing_is_missing_nothing_is_named(tmp_path, seed, steady):
     ("hidden", "name", "parameter", "value"),
     [
         (
-            lambda angle, speed: 0.004 * np.sign(speed) * np.exp(-np.abs(speed) / 12.0),
+            lambda angle, speed: 0.005 * np.sign(speed) * np.exp(-np.abs(speed) / 12.0),
             "stribeck_friction",
             "speed_rad_s",
             12.0,

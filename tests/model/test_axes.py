@@ -61,6 +61,7 @@ AT_MOTOR = {
     "effects.acceleration_feedforward.inertia_kgm2": "inertia",
     "effects.asymmetric_friction.viscous_part_Nms_rad": "damping",
     "effects.cogging_torque.amplitude_Nm": "torque",
+    "effects.dry_friction.torque_Nm": "torque",
     "effects.encoder_eccentricity.amplitude_rad": "angle",
     "effects.presliding_friction.stiffness_Nm_rad": "stiffness",
     "effects.presliding_friction.damping_Nms_rad": "damping",

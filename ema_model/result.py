@@ -28,6 +28,12 @@ VIEWS = "ema_model.views"  # the group of entry points of packages that show res
 
 
 NAME = {"is_name": True}  # `Meta(…, extra=NAME)`: a signal's or a parameter's name inside, or several, or keys
+NULL = {"null": True}  # `Meta(…, extra=NULL)`: a number, or each of several, that may not be finite
+
+
+def as_named(name: str, description: str, **more: Any) -> Meta:
+    """What a field means that has another name in the JSON form; more: of `NAME`, `NULL` and dimensions."""
+    return Meta(description=description, extra={"as": name, **more})
 
 
 class Shows(Protocol):
@@ -43,7 +49,7 @@ class Result(InWords):
 
     def to_dict(self) -> dict[str, Any]:
         """The JSON form: plain values only; a number that is not finite is None."""
-        return _as_dict(self, self.name_in_files)
+        return json_form(self, self.name_in_files)
 
     def name_in_files(self, name: str) -> str:
         """A signal or a parameter as files call it, by its name inside; asked of what is a `NAME`."""
@@ -58,7 +64,7 @@ class Result(InWords):
             raise InputError(f"no {cls.__name__} can be made of it ({quoted(error, 120)}); compute it anew") from None
 
     @property
-    def sentences(self) -> list[str]:
+    def lines(self) -> list[str]:
         """All that `document` says in sentences, its tables left out."""
         told = self.document.blocks
         return [line for block in told if isinstance(block, Lines) for line in block.lines]
@@ -156,6 +162,8 @@ def _json(of: Any) -> Any:
         inner, *said = parts
         dimensions = next((one.extra.get("dimensions", 1) for one in said if isinstance(one, Meta) and one.extra), 1)
         made = _rows(dimensions) if get_origin(inner) is np.ndarray else _json(inner)
+        if any(one.extra.get("null") for one in said if isinstance(one, Meta) and one.extra):
+            made = _or_null(made)
         return Annotated[(made, *said)]
     if origin is np.ndarray:
         return _rows(1)
@@ -164,29 +172,43 @@ def _json(of: Any) -> Any:
     if origin is tuple:
         if parts[-1] is ...:
             return list[_json(parts[0])]
-        return Annotated[list[_json(parts[0])], Meta(min_length=len(parts), max_length=len(parts))]
+        return Annotated[list[_either(parts)], Meta(min_length=len(parts), max_length=len(parts))]
     if origin in (Union, UnionType):
-        return Union[tuple(_json(one) for one in parts)]  # noqa: UP007  made of parts
+        return _either(parts)
     if parts:
         return origin[tuple(_json(one) for one in parts)]  # type: ignore[index]
     return of
+
+
+def _either(parts: tuple[Any, ...]) -> Any:
+    """One of several types."""
+    return Union[tuple(_json(one) for one in parts)]  # noqa: UP007  made of parts
+
+
+def _or_null(of: Any) -> Any:
+    """A type of numbers, of which each may be null."""
+    if get_origin(of) is Annotated:
+        return _or_null(get_args(of)[0])
+    parts = get_args(of)
+    return get_origin(of)[tuple(_or_null(one) for one in parts)] if parts else float | None if of is float else of
 
 
 def _rows(dimensions: int) -> Any:
     return list[_rows(dimensions - 1)] if dimensions else float | None
 
 
-def _as_dict(value: Any, in_files: Callable[[str], str]) -> Any:
+def json_form(value: Any, in_files: Callable[[str], str]) -> Any:
+    """Of a result, or of a part of one, in plain values; in_files: as `Result.name_in_files`."""
     if is_dataclass(value) and not isinstance(value, type):
         found = {}
         for name, one in described(type(value)).items():
-            told = _as_dict(getattr(value, one.attribute), in_files)
+            told = json_form(getattr(value, one.attribute), in_files)
             found[name] = _renamed(told, in_files) if one.is_name else told
         return found
     if isinstance(value, Mapping):
-        return {name: _as_dict(one, in_files) for name, one in value.items()}
+        return {name: json_form(one, in_files) for name, one in value.items()}
     if isinstance(value, list | tuple):
-        return [_as_dict(one, in_files) for one in value]
+        return [json_form(one, in_files) for one in value]
     return plain(value.tolist() if isinstance(value, np.ndarray) else value)
 
 
@@ -194,7 +216,7 @@ def _renamed(value: Any, in_files: Callable[[str], str]) -> Any:
     """A name, several, or what is told by name."""
     if isinstance(value, dict):
         return {in_files(name): one for name, one in value.items()}
-    return in_files(value) if isinstance(value, str) else [in_files(name) for name in value]
+    return in_files(value) if isinstance(value, str) else [_renamed(one, in_files) for one in value]
 
 
 def _stored(given: Any, kind: Any) -> Any:

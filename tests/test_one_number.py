@@ -33,7 +33,6 @@ from ema_model.comparison.result import (
     free_simulation,
     verdict,
 )
-from ema_model.comparison.result import as_dict as compared_as_dict
 from ema_model.discovery import Discovery, discover, result_of, words
 from ema_model.discovery.begin import begun
 from ema_model.discovery.result import Change, errors_of
@@ -60,8 +59,8 @@ from emaviz.page.compare.result import headline, motion_of, numbers
 from emaviz.page.discover import candidate
 from emaviz.page.discover.result import answer
 from emaviz.report import write_discovery_report, write_identification_report
-from emaviz.report.comparison import write_report
 from emaviz.text.results import MEANINGS, of_comparison, of_discovery, sure_words
+from emaviz.views.export import export
 
 FAILING, SLIGHT = 0.006, 0.00035  # N·m of cogging: far beyond noise; so little that a model passes outside its band
 CANDIDATES = ("cogging_torque", "constant_load", "stribeck_friction")
@@ -126,7 +125,7 @@ def texts(result: Any, write: Callable[[Path], None], page: str) -> dict[str, st
 
 @cache
 def of_comparison_texts(found: Comparison) -> dict[str, str]:
-    return texts(found, lambda path: write_report(found, path), headline(found) + numbers(found))
+    return texts(found, lambda path: export(found, path), headline(found) + numbers(found))
 
 
 # --- a comparison -----------------------------------------------------------------------------------------------------
@@ -135,7 +134,7 @@ def of_comparison_texts(found: Comparison) -> dict[str, str]:
 @pytest.mark.parametrize("case", COMPARED)
 def test_every_error_of_a_comparison_is_the_one_of_its_json(case):
     found = compared(case)
-    told, document = of_comparison_texts(found), compared_as_dict(found)
+    told, document = of_comparison_texts(found), found.to_dict()
     known = named(document, IN_FLOORS)
     for who, text in told.items():
         assert unstated(text, known) == [], who
@@ -161,7 +160,7 @@ def test_every_error_of_a_comparison_is_the_one_of_its_json(case):
 @pytest.mark.parametrize("case", COMPARED)
 def test_the_pooled_error_lies_between_those_that_it_pools(case):
     """4.84 floors beside four ratios of 1.10 and less is no mean of anything."""
-    document = compared_as_dict(compared(case))
+    document = compared(case).to_dict()
     each = [one["over_floor"] for one in document["signals"].values() if one["counted"]]
     assert each and min(each) - 1e-9 <= document["over_floor"] <= max(each) + 1e-9
     residuals = compared(case).residuals
@@ -173,7 +172,7 @@ def test_the_pooled_error_lies_between_those_that_it_pools(case):
 @pytest.mark.parametrize("case", COMPARED)
 def test_the_colours_of_a_comparison_are_those_of_its_numbers(case):
     found = compared(case)
-    document = compared_as_dict(found)
+    document = found.to_dict()
     tables = [errors(found)]
     if (each := errors_by_recording(found, found.primary)) is not None:
         tables.append(each)
@@ -215,7 +214,7 @@ def test_a_comparison_says_no_more_than_its_numbers(case):
 @pytest.mark.parametrize("case", COMPARED)
 def test_shares_are_those_of_the_residual_as_it_is(case):
     found = compared(case)
-    document = compared_as_dict(found)
+    document = found.to_dict()
     by = {(one["variable"], one["modulator"]): one["r2"] for one in document["explained_by"]}
     assert all(0.0 <= share <= 1.0 for share in by.values())
     order = list(dict.fromkeys(variable_title(one["variable"]) for one in document["explained_by"]))
@@ -243,7 +242,7 @@ def _modulators(figure: Any) -> list[str]:
 @pytest.mark.parametrize("case", COMPARED)
 def test_a_calibration_is_told_alike(case):
     found = compared(case)
-    fit, document = found.calibration, compared_as_dict(found)
+    fit, document = found.calibration, found.to_dict()
     assert fit is not None and document["calibration"] is not None
     table = calibration_table(fit, found.actuator.axes)
     assert table is not None

@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from itertools import pairwise
-from typing import Annotated, NotRequired, TypedDict
+from typing import TYPE_CHECKING, Annotated, Any, NotRequired, TypedDict
 
 import numpy as np
 from msgspec import Meta
@@ -16,19 +16,11 @@ from ema_model.actuator import Actuator
 from ema_model.actuator.actuator import sentences as phrases_of
 from ema_model.actuator.parameters import on_axes
 from ema_model.comparison.criteria import BAND
+from ema_model.comparison.free_simulation import FreeError, errors_in_units
 from ema_model.comparison.loop_lag import BLAMED, LoopLag
+from ema_model.comparison.regions import Event
 from ema_model.comparison.residuals import dependence
-from ema_model.comparison.result import (
-    CalibrationJson,
-    EventJson,
-    ParameterJson,
-    SimulatedJson,
-    calibration_dict,
-    event_dict,
-    free_simulation,
-    parameter_dict,
-    simulation_dict,
-)
+from ema_model.comparison.result import free_simulation
 from ema_model.comparison.verdict import ORDER_OF_PRIMARY
 from ema_model.discovery.criteria import FAR
 from ema_model.discovery.observed.controller import ControllerSeen
@@ -37,13 +29,14 @@ from ema_model.discovery.verify import Verified
 from ema_model.effects import CATALOGUE, find
 from ema_model.effects.effect import FAMILIES
 from ema_model.errors import InputError
-from ema_model.estimation import Calibrated
-from ema_model.estimation.calibrate import CombinationJson, combinations, together
+from ema_model.estimation import Calibrated, Calibration
+from ema_model.estimation.calibrate import KnownTogether, combinations, together
 from ema_model.faults import BY_NAME, FAULTS, NAMES, cause_of, causes, vector
 from ema_model.quantities.axes import Axes, of_signal
 from ema_model.quantities.numbers import IntervalJson, Quantity, amount, number, plain, with_uncertainty
 from ema_model.quantities.sides import USER
 from ema_model.quantities.titles import all_of, in_sentence
+from ema_model.result import json_form, json_type
 from ema_model.simulation.run import run_in_words
 from ema_model.text import Document, Facts, Lines, Note, Table
 
@@ -528,6 +521,14 @@ _FAULT = "fault"  # in place of the family of a candidate that is one
 _RMSE = "rms error pooled over signals, in units of the floor; 1 is the floor"
 
 
+if TYPE_CHECKING:
+    CalibrationJson = CombinationJson = SimulatedJson = ParameterJson = EventJson = dict[str, Any]
+else:
+    CalibrationJson, CombinationJson, SimulatedJson, ParameterJson, EventJson = map(
+        json_type, (Calibration, KnownTogether, FreeError, Calibrated, Event)
+    )
+
+
 class EffectParameterJson(TypedDict):
     """A parameter of an added effect, in its `unit`; one that was chosen, as a whole order, was not fitted."""
 
@@ -727,17 +728,21 @@ class DiscoveryJson(TypedDict):
 def as_dict(found: Discovery) -> DiscoveryJson:
     """Everything but the series, in numbers and texts that JSON can hold; unknown numbers are None."""
     axes = found.actuator.axes
+
+    def in_files(name: str) -> str:
+        return on_axes(name, axes).path
+
     unknown, seen = found.unknown, found.transmission_seen
     twice, is_believable = found.repeated, found.floor_believable
     document: DiscoveryJson = {
         "verdict": found.verdict,
-        "calibration": calibration_dict(found.calibration, axes),
-        "identifiable": combinations(found.calibration.identifiable, axes),
+        "calibration": json_form(found.calibration, in_files),
+        "identifiable": json_form(combinations(found.calibration.identifiable, axes), in_files),
         "effects": [_added(found, one) for one in found.effects],
         "ladder": [_rung(rung, axes, is_believable) for rung in found.ladder],
-        "simulation": simulation_dict(found.simulation),
+        "simulation": json_form(errors_in_units(found.simulation), in_files),
         "candidates": [_candidate(one, axes) for one in found.ranked],
-        "faults": {name: parameter_dict(one) for name, one in found.faults.items()},
+        "faults": json_form(found.faults, in_files),
         "parameters_outside_tolerance": [on_axes(name, axes).path for name in found.parameters_outside_tolerance],
         "unknown": None
         if unknown is None
@@ -780,7 +785,7 @@ def as_dict(found: Discovery) -> DiscoveryJson:
             }
             for one in found.disagreements
         ],
-        "events": [event_dict(one) for one in found.events],
+        "events": json_form(found.events, in_files),
         "warnings": [*found.warnings, *masked(found.effects, found.actuator.axes)],
     }
     return plain(document)
@@ -855,7 +860,7 @@ def _experiment(one: Experiment | None) -> ExperimentJson | None:
 def _added(found: Discovery, one: Added) -> AddedJson:
     axes = found.actuator.axes
     parameters: dict[str, EffectParameterJson] = {
-        name: {**parameter_dict(fitted_of(found, one, name))} for name in one.parameters
+        name: json_form(fitted_of(found, one, name), str) for name in one.parameters
     }
     for name, value in one.chosen.items():
         parameters[name] = {"value": value, "interval90": [value, value], "unit": ""}

@@ -10,10 +10,10 @@ from msgspec import Meta
 
 from ema_model.actuator import Actuator
 from ema_model.actuator.parameters import on_axes
-from ema_model.comparison.result import ParameterJson, parameter_dict
 from ema_model.discovery import Added, Discovery, discover
 from ema_model.discovery import as_dict as of_discovery
 from ema_model.discovery.words import DiscoveryJson, effect_title
+from ema_model.estimation import Calibrated
 from ema_model.fleet.compare import check_units, compare_units
 from ema_model.fleet.result import UnitsCompared, and_so_on, notes, rests_on
 from ema_model.fleet.result import document_of as document_of_compared
@@ -22,7 +22,7 @@ from ema_model.quantities.axes import Axes
 from ema_model.quantities.numbers import number
 from ema_model.quantities.titles import in_sentence
 from ema_model.recordings import Measurement
-from ema_model.result import json_type
+from ema_model.result import json_form, json_type
 from ema_model.text import Block, Document, InWords, Lines, Note, Table
 
 # --- looks for the physics that units lack: unit by unit, and in each again for what others lack ----------------------
@@ -252,9 +252,9 @@ def _table(result: UnitsDiscovered) -> Table:
 
 
 if TYPE_CHECKING:
-    UnitsComparedJson = dict[str, Any]
+    UnitsComparedJson = ParameterJson = dict[str, Any]
 else:
-    UnitsComparedJson = json_type(UnitsCompared)  # of its fields
+    UnitsComparedJson, ParameterJson = json_type(UnitsCompared), json_type(Calibrated)  # of their fields
 
 
 class LackOfUnitJson(TypedDict):
@@ -314,7 +314,7 @@ def _added(one: Added, axes: Axes) -> LackOfUnitJson:
     return {
         "name": one.name,
         "parameters": {
-            on_axes(f"effects.{one.key}.{name}", axes).name: parameter_dict(parameter)
+            on_axes(f"effects.{one.key}.{name}", axes).name: json_form(parameter, str)
             for name, parameter in one.parameters.items()
         },
         "chosen": dict(one.chosen),

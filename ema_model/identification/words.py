@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from typing import Annotated, NotRequired, TypedDict
+from typing import TYPE_CHECKING, Annotated, Any, NotRequired, TypedDict
 
 import numpy as np
 from msgspec import Meta
@@ -13,11 +13,12 @@ from ema_model import faults
 from ema_model.actuator import Actuator
 from ema_model.actuator.actuator import between, readings, sentences
 from ema_model.actuator.parameters import on_axes
-from ema_model.estimation.calibrate import CombinationJson, combination_in_words, combinations
+from ema_model.estimation.calibrate import KnownTogether, combination_in_words, combinations
 from ema_model.identification.run import Identification, Progress, algorithm_title
 from ema_model.identification.search import Landscape, Way
 from ema_model.quantities.numbers import IntervalJson, amount
 from ema_model.quantities.titles import in_sentence
+from ema_model.result import json_form, json_type
 from ema_model.simulation.run import run_in_words
 from ema_model.text import Document, Lines, Remark, Remarks, Table
 
@@ -155,6 +156,12 @@ def way_sentences(found: Mapping[str, Way], fitted: str = "") -> Sequence[str]:
 # --- the JSON form of an identification: what each field means, and where it is from ----------------------------------
 
 
+if TYPE_CHECKING:
+    CombinationJson = dict[str, Any]
+else:
+    CombinationJson = json_type(KnownTogether)
+
+
 class HistoryJson(TypedDict):
     """The search, iteration by iteration; the first is the first random population."""
 
@@ -221,7 +228,9 @@ def as_dict(answer: Identification, actuator: Actuator, holdout_rmse: float | No
         "alarms": list(sure.alarms),
         "ambiguous": [list(group) for group in sure.ambiguous],
         "hardly_known": list(sure.hardly_known),
-        "identifiable": combinations(sure.identifiable, actuator.axes),
+        "identifiable": json_form(
+            combinations(sure.identifiable, actuator.axes), lambda name: on_axes(name, actuator.axes).path
+        ),
         "separated_by": sure.separated_by.options if sure.separated_by else "",
         "uninformative": bool(sure.uninformative),
         "adequate": bool(sure.adequate),

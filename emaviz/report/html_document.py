@@ -41,6 +41,15 @@ def bullets(texts: Iterable[object], kind: str = "") -> str:
     return f"<ul{_class(kind)}>{items}</ul>" if items else ""
 
 
+def marked(texts: Iterable[object], marks: Iterable[tuple[str, str]]) -> str:
+    """A list of plain texts, each behind a mark: its name, and the sign."""
+    items = (
+        f'<li><span class="{name}" title="{name}">{sign}</span>{escape(text)}</li>'
+        for text, (name, sign) in zip(texts, marks)
+    )
+    return f'<ul class="findings">{"".join(items)}</ul>'
+
+
 def table(heads: Sequence[str], rows: Iterable[Sequence[object]], *, text_columns: int = 1, marked: str = "") -> str:
     """A table of plain texts; the first `text_columns` are set left, the others, numbers, right.
 

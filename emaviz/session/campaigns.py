@@ -277,11 +277,11 @@ def _identified(task: Task, it: TaskInputs, path: Path, tell: Tell) -> None:
 
 
 def _compared(task: Task, it: TaskInputs, path: Path, tell: Tell) -> None:
-    from emaviz.recording.comparison import write_comparison
+    from emaviz.views.export import export
 
     own = msgspec.convert(task.settings, KINDS["compare"].settings)
     found = compare(it.fitted, it.actuator, calibrate=own.calibrate, holdout=it.held, on_progress=tell)
-    write_comparison(found, path, _configuration(task))
+    export(found, path, _configuration(task))
 
 
 def _discovered(task: Task, it: TaskInputs, path: Path, tell: Tell) -> None:

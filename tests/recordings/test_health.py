@@ -75,7 +75,7 @@ def test_the_worst_finding_is_the_cards():
     found = card(reference())
     worst = max(("good", "note", "warning").index(finding.severity) for finding in found.findings)
     assert found.severity == ("good", "note", "warning")[worst]
-    json.dumps(found.as_dict(), allow_nan=False)
+    json.dumps(found.to_dict(), allow_nan=False)
     assert all(finding.sentence.endswith(".") and finding.sentence.isprintable() for finding in found.findings)
 
 

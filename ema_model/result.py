@@ -11,6 +11,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, fields, is_dataclass
 from functools import cache
 from importlib.metadata import entry_points
+from operator import attrgetter
 from pathlib import Path
 from types import NoneType, UnionType
 from typing import Annotated, Any, Protocol, Self, TypedDict, Union, cast, get_args, get_origin, get_type_hints
@@ -29,6 +30,8 @@ VIEWS = "ema_model.views"  # the group of entry points of packages that show res
 
 NAME = {"is_name": True}  # `Meta(…, extra=NAME)`: a signal's or a parameter's name inside, or several, or keys
 NULL = {"null": True}  # `Meta(…, extra=NULL)`: a number, or each of several, that may not be finite
+
+FLAT = {"flat": True}  # `Meta(extra=FLAT)`: a part of the result whose fields stand among the result's own
 
 
 def as_named(name: str, description: str, **more: Any) -> Meta:
@@ -115,7 +118,7 @@ def _shows() -> Shows:
 class Described:
     """A field, or a property, that is in the JSON form."""
 
-    attribute: str
+    attribute: str  # dotted where it is of a flat part
     type: Any  # with what it means
     is_name: bool
 
@@ -137,6 +140,10 @@ def described(kind: type) -> dict[str, Described]:
         said = [one for one in getattr(of, "__metadata__", ()) if isinstance(one, Meta)]
         if said:
             extra = said[0].extra or {}
+            if extra.get("flat"):
+                part = described(get_args(of)[0])
+                found |= {key: Described(f"{name}.{one.attribute}", one.type, one.is_name) for key, one in part.items()}
+                continue
             found[extra.get("as", name)] = Described(name, of, extra.get("is_name", False))
     return found
 
@@ -202,7 +209,7 @@ def json_form(value: Any, in_files: Callable[[str], str]) -> Any:
     if is_dataclass(value) and not isinstance(value, type):
         found = {}
         for name, one in described(type(value)).items():
-            told = json_form(getattr(value, one.attribute), in_files)
+            told = json_form(attrgetter(one.attribute)(value), in_files)
             found[name] = _renamed(told, in_files) if one.is_name else told
         return found
     if isinstance(value, Mapping):

@@ -41,7 +41,6 @@ from ema_model.estimation.calibrate import calibration_table, combination_in_wor
 from ema_model.faults import NAMES
 from ema_model.identification.run import Identification, identify
 from ema_model.identification.search import Objective
-from ema_model.identification.words import as_dict as identified_as_dict
 from ema_model.identification.words import in_one_line
 from ema_model.identification.words import verdict as identified_verdict
 from ema_model.quantities.axes import of_signal
@@ -58,7 +57,7 @@ from emaviz.figures.identification import fault_bars
 from emaviz.page.compare.result import headline, motion_of, numbers
 from emaviz.page.discover import candidate
 from emaviz.page.discover.result import answer
-from emaviz.report import write_discovery_report, write_identification_report
+from emaviz.report import write_discovery_report
 from emaviz.text.results import MEANINGS, of_comparison, of_discovery, sure_words
 from emaviz.views.export import export
 
@@ -407,21 +406,21 @@ def test_candidates_stand_in_one_order():
 
 
 @cache
-def identified() -> tuple[Identification, Objective]:
+def identified() -> Identification:
     """A short search on a simulated run; the phases of its motor are known together alone."""
     path = str(Path(_FOLDER[0]) / "chirp.csv")
     asked = "simulate --fault k2=0.3 --duration 0.1 --noise-current 0.1 --seed 3 --out"
     assert main([*asked.split(), path]) == 0
     objective = Objective([read_measurement(path)], load_actuator())
-    return identify(objective, "do", population=4, iterations=2, polish=True), objective
+    return identify(objective, "do", population=4, iterations=2, polish=True)
 
 
 def test_an_identification_is_told_alike():
-    found, objective = identified()
-    document = identified_as_dict(found, found.actuator)
+    found = identified()
+    document = found.to_dict()
     bars = fault_bars(found.k, found.actuator, None, found.uncertainty.interval90, found.uncertainty.alarms)
     page = sure_words(found) + bars
-    told = texts(found, lambda path: write_identification_report(found, objective, path), page)
+    told = texts(found, lambda path: export(found, path), page)
     for name, k, (low, high) in zip(NAMES, document["k"], document["k_interval90"]):
         for who in ("terminal", "notebook", "report"):
             assert f"{k:.4f}" in told[who] and f"{low:.4f} … {high:.4f}" in told[who], (who, name)
@@ -448,7 +447,7 @@ def test_an_identification_is_told_alike():
 
 def test_what_is_known_only_together_holds_the_truth():
     """The play is the file's times 1 + 99 k2; both may be anything, their product was put in."""
-    found, _ = identified()
+    found = identified()
     truth = found.actuator.transmission.backlash_rad * (1.0 + 99.0 * 0.3)
     [play] = [one for one in found.uncertainty.identifiable if "k2" in one.powers]
     low, high = play.interval90

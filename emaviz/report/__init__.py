@@ -2,10 +2,8 @@
 
 from emaviz.report.discovery import write_discovery_report
 from emaviz.report.export import write_export_report
-from emaviz.report.identification import write_identification_report
 
 __all__ = [
     "write_discovery_report",
     "write_export_report",
-    "write_identification_report",
 ]

@@ -157,7 +157,8 @@ def json_type(kind: type, *more: type) -> Any:
     types = {name: _json(one.type) for name, one in described(kind).items()}
     for one in more:
         types |= get_type_hints(one, include_extras=True)
-    made = TypedDict(kind.__name__, types)  # type: ignore[operator]
+    name = "".join([kind.__name__, *(one.__name__.removesuffix("Json") for one in more)])  # one form has one name
+    made = TypedDict(name, types)  # type: ignore[operator]
     made.__doc__ = (kind.__doc__ or "").strip().partition("\n")[0]
     return made
 
@@ -206,6 +207,8 @@ def _rows(dimensions: int) -> Any:
 
 def json_form(value: Any, in_files: Callable[[str], str]) -> Any:
     """Of a result, or of a part of one, in plain values; in_files: as `Result.name_in_files`."""
+    if isinstance(value, Result):
+        in_files = value.name_in_files
     if is_dataclass(value) and not isinstance(value, type):
         found = {}
         for name, one in described(type(value)).items():
@@ -220,7 +223,9 @@ def json_form(value: Any, in_files: Callable[[str], str]) -> Any:
 
 
 def _renamed(value: Any, in_files: Callable[[str], str]) -> Any:
-    """A name, several, or what is told by name."""
+    """A name, several, or what is told by name; None where there is none."""
+    if value is None:
+        return None
     if isinstance(value, dict):
         return {in_files(name): one for name, one in value.items()}
     return in_files(value) if isinstance(value, str) else [_renamed(one, in_files) for one in value]

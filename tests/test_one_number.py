@@ -57,7 +57,6 @@ from emaviz.figures.identification import fault_bars
 from emaviz.page.compare.result import headline, motion_of, numbers
 from emaviz.page.discover import candidate
 from emaviz.page.discover.result import answer
-from emaviz.report import write_discovery_report
 from emaviz.text.results import MEANINGS, of_comparison, of_discovery, sure_words
 from emaviz.views.export import export
 
@@ -267,7 +266,7 @@ def test_a_calibration_is_told_alike(case):
 def of_discovery_texts(found: Discovery) -> dict[str, str]:
     look: Any = type("Shown", (), {})()
     look.found, look.assessment, look.added, look.promising = found, _nothing_left(), list(found.effects), []
-    return texts(found, lambda path: write_discovery_report(found, path), answer(look))
+    return texts(found, lambda path: export(found, path), answer(look))
 
 
 def _nothing_left() -> Any:
@@ -283,7 +282,7 @@ def _nothing_left() -> Any:
 @pytest.mark.parametrize("case", DISCOVERED)
 def test_every_error_of_a_discovery_is_the_one_of_its_json(case):
     found = discovered(case)
-    document = words.as_dict(found)
+    document = found.to_dict()
     known = named(document, ON_LADDER) + named(
         document["ladder"], ("rmse", "holdout_rmse", "recordings", "holdout_recordings")
     )
@@ -308,7 +307,7 @@ def test_every_error_of_a_discovery_is_the_one_of_its_json(case):
 
 def test_an_effects_errors_are_those_of_the_ladder():
     """They are told by the ladder, whose steps are counted anew where a fit is settled."""
-    document = words.as_dict(discovered("found"))
+    document = discovered("found").to_dict()
     [one], (before, after) = document["effects"], document["ladder"][-2:]
     assert (one["rmse_before"], one["rmse_after"]) == (before["rmse"], after["rmse"])
     assert (one["holdout_rmse_before"], one["holdout_rmse_after"]) == (before["holdout_rmse"], after["holdout_rmse"])
@@ -328,7 +327,7 @@ def test_an_effect_in_anothers_place_is_told_from_the_step_before_both():
 @pytest.mark.parametrize("case", DISCOVERED)
 def test_a_discovery_says_no_more_than_its_numbers(case):
     found = discovered(case)
-    document = words.as_dict(found)
+    document = found.to_dict()
     for error, band, nothing in ((found.ladder[-1].rmse, found.floor_band, True), (1.08, (0.96, 1.04), False)):
         if not nothing:  # as of a clean hobby rig
             found = replace(found, ladder=[*found.ladder[:-1], replace(found.ladder[-1], rmse=error)], held=None)
@@ -355,7 +354,7 @@ def test_nothing_is_missing_is_not_said_of_an_error_outside_its_band():
         "At 1.08 times the floor, where a true model's error is 0.96 to 1.04, 8 % more is left than noise explains, "
         "and no effect of the library explains it."
     )
-    assert of_discovery(told) == "warning" and not words.as_dict(told)["remaining"]["within_band"]
+    assert of_discovery(told) == "warning" and not told.to_dict()["remaining"]["within_band"]
 
 
 @cache
@@ -393,7 +392,7 @@ def test_candidates_stand_in_one_order():
     table = words.candidates(found)
     assert table is not None
     titles = [row[0] for row in table.rows]
-    assert titles == [words.effect_title(one["name"]) for one in words.as_dict(found)["candidates"]]
+    assert titles == [words.effect_title(one["name"]) for one in found.to_dict()["candidates"]]
     chart = discovery_figures.candidates(found)
     drawn = [re.sub(r"<[^>]+>", "", one) for one in chart.layout.yaxis.ticktext][::-1]
     assert drawn == titles

@@ -12,9 +12,9 @@ from support.discovered import with_cogging
 
 from emaviz.page.compare.result import headline
 from emaviz.page.discover.result import answer
-from emaviz.report.discovery import Verdict
 from emaviz.report.html_document import Figures
 from emaviz.text.results import MEANINGS, of_discovery, of_units
+from emaviz.views import discovery
 from emaviz.views.comparison import VIEW
 from emaviz.views.export import markup
 
@@ -61,10 +61,8 @@ def test_a_discovery_is_green_where_nothing_is_missing():
     }
     for meaning, answers in meanings.items():
         assert [of_discovery(one) for one in answers] == [meaning] * len(answers)
-    told: Any
     for one in (replace(found, verdict="effects_found"), nothing):
         meaning = of_discovery(one)
         assert MEANINGS[meaning] in answer(look(one)) and (GREEN in answer(look(one))) == (one is nothing)
-        told = SimpleNamespace(found=one)
-        assert f'class="verdict {meaning}"' in Verdict().body(told, Figures())
+        assert f'class="verdict {meaning}"' in markup(discovery.VIEW.sections[0].pieces(one), Figures())
     assert GREEN not in answer(look(nothing, assessed=False)), "it is not yet known"

@@ -12,7 +12,6 @@ from support.unknown_drive import drive_of, logged
 from ema_model.actuator import load_actuator
 from ema_model.comparison import compare
 from ema_model.comparison.free_simulation import _scores
-from ema_model.discovery import as_dict as discovery_as_dict
 from ema_model.discovery import discover
 from ema_model.models.open_loop import FreeMotion, free_motion
 from ema_model.recordings import Measurement
@@ -176,7 +175,7 @@ def test_a_discovery_scores_its_last_model_as_a_comparison_does(actuator):
 
     recordings = [logged(seed, noise_A=0.02, counts=None, hidden=hidden) for seed in (5, 6)]
     found = discover(recordings[:1], actuator, holdout=recordings[1:], candidates=["cogging_torque"], most_effects=1)
-    told = discovery_as_dict(found)["simulation"]["motor_position_rad"]
+    told = found.to_dict()["simulation"]["motor_position_rad"]
     again = compare(recordings[:1], found.actuator, calibrate=False, holdout=recordings[1:])
     its = again.to_dict()["simulation"]["motor_position_rad"]
     print(told, its)

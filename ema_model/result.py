@@ -1,13 +1,14 @@
 """What every analysis answers with: a frozen dataclass that says, shows, exports and restores itself.
 
 A field is in the JSON form where its type says what it means: `Annotated[float, Meta(description="Hz")]`.  So is a
-property with such a type, which is told and not restored.  The schema is made of the same types.
+property with such a type, which is told and not restored.  The schema is made of the same types.  A result that has
+fields beside its JSON form, as the series of a comparison, is told by it and not restored of it.
 """
 
 from __future__ import annotations
 
 import importlib
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, fields, is_dataclass
 from functools import cache
 from importlib.metadata import entry_points
@@ -137,15 +138,20 @@ def described(kind: type) -> dict[str, Described]:
                 types[name] = get_type_hints(one.fget, include_extras=True).get("return")
     found = {}
     for name, of in types.items():
-        said = [one for one in getattr(of, "__metadata__", ()) if isinstance(one, Meta)]
-        if said:
-            extra = said[0].extra or {}
+        extra = _extra(of)
+        if extra is not None:
             if extra.get("flat"):
                 part = described(get_args(of)[0])
                 found |= {key: Described(f"{name}.{one.attribute}", one.type, one.is_name) for key, one in part.items()}
                 continue
             found[extra.get("as", name)] = Described(name, of, extra.get("is_name", False))
     return found
+
+
+def _extra(of: Any) -> dict[str, Any] | None:
+    """What is said of a field beside its meaning; None of one that is not in the JSON form."""
+    said = [one for one in getattr(of, "__metadata__", ()) if isinstance(one, Meta)]
+    return (said[0].extra or {}) if said else None
 
 
 @cache
@@ -237,15 +243,24 @@ def _stored(given: Any, kind: Any) -> Any:
         return _stored(given, get_args(kind)[0])
     if isinstance(given, Mapping) and isinstance(kind, type) and is_dataclass(kind):
         hints = get_type_hints(kind, include_extras=True)
-        return {one.name: _stored(given[one.name], hints[one.name]) for one in fields(kind) if one.name in given}
+        found = {}
+        for one in fields(kind):
+            extra = _extra(hints[one.name])
+            if extra is None:
+                continue
+            if extra.get("flat"):
+                found[one.name] = _stored(given, hints[one.name])
+            elif (key := extra.get("as", one.name)) in given:
+                found[one.name] = _stored(given[key], hints[one.name])
+        return found
     if given is None:
         return float("nan") if kind is float else None
     parts = [one for one in get_args(kind) if one not in (NoneType, ...)]
-    if isinstance(given, Mapping) and get_origin(kind) is dict:
+    if isinstance(given, Mapping) and get_origin(kind) in (dict, Mapping):
         return {name: _stored(one, parts[1]) for name, one in given.items()}
     if get_origin(kind) in (Union, UnionType):
         return _stored(given, parts[0]) if len(parts) == 1 else given
-    if isinstance(given, list | tuple) and get_origin(kind) in (list, tuple):
+    if isinstance(given, list | tuple) and get_origin(kind) in (list, tuple, Sequence):
         return [_stored(one, parts[min(i, len(parts) - 1)]) for i, one in enumerate(given)]
     return given
 

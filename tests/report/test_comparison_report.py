@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import errno
+import json
 import os
 import re
 from collections.abc import Iterator
@@ -48,6 +49,21 @@ def test_it_says_what_was_found(report, comparison):
     assert f">{error.rmse:.3f}<" in text and f">{error.in_floors.text}<" in text
     assert "not adequate" in text and "Data health" in text
     assert "+3.00" in text and "Motor inertia stands at the bound" in text
+
+
+def test_the_result_shows_and_exports_itself(report, comparison, tmp_path):
+    assert len(comparison.figures()) == _own_text(report).count("data-figure=") > 10
+    comparison.export(tmp_path / "errors.csv")
+    head, *rows = (tmp_path / "errors.csv").read_text().splitlines()
+    assert head.startswith("signal,rmse,") and [one.split(",")[0] for one in rows] == list(comparison.signals)
+    assert float(rows[0].split(",")[1]) == comparison.signals["current_A"].rmse
+    comparison.export(tmp_path / "all.json")
+    told = json.loads((tmp_path / "all.json").read_text())
+    assert told == json.loads(json.dumps(comparison.to_dict())) and told["worst_regions"][0]["from"] > 0.0
+    with pytest.raises(InputError, match="end in one of these"):
+        comparison.export(tmp_path / "all.docx")
+    with pytest.raises(InputError, match="compute it anew"):  # its series are not told
+        Comparison.from_dict(told)
 
 
 def test_every_link_leads_somewhere(report):

@@ -1,16 +1,18 @@
 """What every analysis answers with: a frozen dataclass that says, shows, exports and restores itself.
 
 A field is in the JSON form where its type says what it means: `Annotated[float, Meta(description="Hz")]`.  So is a
-property with such a type, which is told and not restored.  The schema is made of the same types.
+property with such a type, which is told and not restored.  The schema is made of the same types.  A result that has
+fields beside its JSON form, as the series of a comparison, is told by it and not restored of it.
 """
 
 from __future__ import annotations
 
 import importlib
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, fields, is_dataclass
 from functools import cache
 from importlib.metadata import entry_points
+from operator import attrgetter
 from pathlib import Path
 from types import NoneType, UnionType
 from typing import Annotated, Any, Protocol, Self, TypedDict, Union, cast, get_args, get_origin, get_type_hints
@@ -28,6 +30,14 @@ VIEWS = "ema_model.views"  # the group of entry points of packages that show res
 
 
 NAME = {"is_name": True}  # `Meta(…, extra=NAME)`: a signal's or a parameter's name inside, or several, or keys
+NULL = {"null": True}  # `Meta(…, extra=NULL)`: a number, or each of several, that may not be finite
+
+FLAT = {"flat": True}  # `Meta(extra=FLAT)`: a part of the result whose fields stand among the result's own
+
+
+def as_named(name: str, description: str, **more: Any) -> Meta:
+    """What a field means that has another name in the JSON form; more: of `NAME`, `NULL` and dimensions."""
+    return Meta(description=description, extra={"as": name, **more})
 
 
 class Shows(Protocol):
@@ -43,7 +53,7 @@ class Result(InWords):
 
     def to_dict(self) -> dict[str, Any]:
         """The JSON form: plain values only; a number that is not finite is None."""
-        return _as_dict(self, self.name_in_files)
+        return json_form(self, self.name_in_files)
 
     def name_in_files(self, name: str) -> str:
         """A signal or a parameter as files call it, by its name inside; asked of what is a `NAME`."""
@@ -58,7 +68,7 @@ class Result(InWords):
             raise InputError(f"no {cls.__name__} can be made of it ({quoted(error, 120)}); compute it anew") from None
 
     @property
-    def sentences(self) -> list[str]:
+    def lines(self) -> list[str]:
         """All that `document` says in sentences, its tables left out."""
         told = self.document.blocks
         return [line for block in told if isinstance(block, Lines) for line in block.lines]
@@ -109,7 +119,7 @@ def _shows() -> Shows:
 class Described:
     """A field, or a property, that is in the JSON form."""
 
-    attribute: str
+    attribute: str  # dotted where it is of a flat part
     type: Any  # with what it means
     is_name: bool
 
@@ -128,11 +138,20 @@ def described(kind: type) -> dict[str, Described]:
                 types[name] = get_type_hints(one.fget, include_extras=True).get("return")
     found = {}
     for name, of in types.items():
-        said = [one for one in getattr(of, "__metadata__", ()) if isinstance(one, Meta)]
-        if said:
-            extra = said[0].extra or {}
+        extra = _extra(of)
+        if extra is not None:
+            if extra.get("flat"):
+                part = described(get_args(of)[0])
+                found |= {key: Described(f"{name}.{one.attribute}", one.type, one.is_name) for key, one in part.items()}
+                continue
             found[extra.get("as", name)] = Described(name, of, extra.get("is_name", False))
     return found
+
+
+def _extra(of: Any) -> dict[str, Any] | None:
+    """What is said of a field beside its meaning; None of one that is not in the JSON form."""
+    said = [one for one in getattr(of, "__metadata__", ()) if isinstance(one, Meta)]
+    return (said[0].extra or {}) if said else None
 
 
 @cache
@@ -144,7 +163,8 @@ def json_type(kind: type, *more: type) -> Any:
     types = {name: _json(one.type) for name, one in described(kind).items()}
     for one in more:
         types |= get_type_hints(one, include_extras=True)
-    made = TypedDict(kind.__name__, types)  # type: ignore[operator]
+    name = "".join([kind.__name__, *(one.__name__.removesuffix("Json") for one in more)])  # one form has one name
+    made = TypedDict(name, types)  # type: ignore[operator]
     made.__doc__ = (kind.__doc__ or "").strip().partition("\n")[0]
     return made
 
@@ -156,6 +176,8 @@ def _json(of: Any) -> Any:
         inner, *said = parts
         dimensions = next((one.extra.get("dimensions", 1) for one in said if isinstance(one, Meta) and one.extra), 1)
         made = _rows(dimensions) if get_origin(inner) is np.ndarray else _json(inner)
+        if any(one.extra.get("null") for one in said if isinstance(one, Meta) and one.extra):
+            made = _or_null(made)
         return Annotated[(made, *said)]
     if origin is np.ndarray:
         return _rows(1)
@@ -164,37 +186,55 @@ def _json(of: Any) -> Any:
     if origin is tuple:
         if parts[-1] is ...:
             return list[_json(parts[0])]
-        return Annotated[list[_json(parts[0])], Meta(min_length=len(parts), max_length=len(parts))]
+        return Annotated[list[_either(parts)], Meta(min_length=len(parts), max_length=len(parts))]
     if origin in (Union, UnionType):
-        return Union[tuple(_json(one) for one in parts)]  # noqa: UP007  made of parts
+        return _either(parts)
     if parts:
         return origin[tuple(_json(one) for one in parts)]  # type: ignore[index]
     return of
+
+
+def _either(parts: tuple[Any, ...]) -> Any:
+    """One of several types."""
+    return Union[tuple(_json(one) for one in parts)]  # noqa: UP007  made of parts
+
+
+def _or_null(of: Any) -> Any:
+    """A type of numbers, of which each may be null."""
+    if get_origin(of) is Annotated:
+        return _or_null(get_args(of)[0])
+    parts = get_args(of)
+    return get_origin(of)[tuple(_or_null(one) for one in parts)] if parts else float | None if of is float else of
 
 
 def _rows(dimensions: int) -> Any:
     return list[_rows(dimensions - 1)] if dimensions else float | None
 
 
-def _as_dict(value: Any, in_files: Callable[[str], str]) -> Any:
+def json_form(value: Any, in_files: Callable[[str], str]) -> Any:
+    """Of a result, or of a part of one, in plain values; in_files: as `Result.name_in_files`."""
+    if isinstance(value, Result):
+        in_files = value.name_in_files
     if is_dataclass(value) and not isinstance(value, type):
         found = {}
         for name, one in described(type(value)).items():
-            told = _as_dict(getattr(value, one.attribute), in_files)
+            told = json_form(attrgetter(one.attribute)(value), in_files)
             found[name] = _renamed(told, in_files) if one.is_name else told
         return found
     if isinstance(value, Mapping):
-        return {name: _as_dict(one, in_files) for name, one in value.items()}
+        return {name: json_form(one, in_files) for name, one in value.items()}
     if isinstance(value, list | tuple):
-        return [_as_dict(one, in_files) for one in value]
+        return [json_form(one, in_files) for one in value]
     return plain(value.tolist() if isinstance(value, np.ndarray) else value)
 
 
 def _renamed(value: Any, in_files: Callable[[str], str]) -> Any:
-    """A name, several, or what is told by name."""
+    """A name, several, or what is told by name; None where there is none."""
+    if value is None:
+        return None
     if isinstance(value, dict):
         return {in_files(name): one for name, one in value.items()}
-    return in_files(value) if isinstance(value, str) else [in_files(name) for name in value]
+    return in_files(value) if isinstance(value, str) else [_renamed(one, in_files) for one in value]
 
 
 def _stored(given: Any, kind: Any) -> Any:
@@ -203,15 +243,24 @@ def _stored(given: Any, kind: Any) -> Any:
         return _stored(given, get_args(kind)[0])
     if isinstance(given, Mapping) and isinstance(kind, type) and is_dataclass(kind):
         hints = get_type_hints(kind, include_extras=True)
-        return {one.name: _stored(given[one.name], hints[one.name]) for one in fields(kind) if one.name in given}
+        found = {}
+        for one in fields(kind):
+            extra = _extra(hints[one.name])
+            if extra is None:
+                continue
+            if extra.get("flat"):
+                found[one.name] = _stored(given, hints[one.name])
+            elif (key := extra.get("as", one.name)) in given:
+                found[one.name] = _stored(given[key], hints[one.name])
+        return found
     if given is None:
         return float("nan") if kind is float else None
     parts = [one for one in get_args(kind) if one not in (NoneType, ...)]
-    if isinstance(given, Mapping) and get_origin(kind) is dict:
+    if isinstance(given, Mapping) and get_origin(kind) in (dict, Mapping):
         return {name: _stored(one, parts[1]) for name, one in given.items()}
     if get_origin(kind) in (Union, UnionType):
         return _stored(given, parts[0]) if len(parts) == 1 else given
-    if isinstance(given, list | tuple) and get_origin(kind) in (list, tuple):
+    if isinstance(given, list | tuple) and get_origin(kind) in (list, tuple, Sequence):
         return [_stored(one, parts[min(i, len(parts) - 1)]) for i, one in enumerate(given)]
     return given
 

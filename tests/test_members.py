@@ -180,7 +180,7 @@ class Levels(Result):
 
     @property
     def answer(self) -> Annotated[tuple[str, ...], Meta(description="in sentences")]:
-        return tuple(self.sentences)
+        return tuple(self.lines)
 
 
 RESULT = Levels

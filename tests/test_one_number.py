@@ -33,7 +33,6 @@ from ema_model.comparison.result import (
     free_simulation,
     verdict,
 )
-from ema_model.comparison.result import as_dict as compared_as_dict
 from ema_model.discovery import Discovery, discover, result_of, words
 from ema_model.discovery.begin import begun
 from ema_model.discovery.result import Change, errors_of
@@ -42,7 +41,6 @@ from ema_model.estimation.calibrate import calibration_table, combination_in_wor
 from ema_model.faults import NAMES
 from ema_model.identification.run import Identification, identify
 from ema_model.identification.search import Objective
-from ema_model.identification.words import as_dict as identified_as_dict
 from ema_model.identification.words import in_one_line
 from ema_model.identification.words import verdict as identified_verdict
 from ema_model.quantities.axes import of_signal
@@ -59,9 +57,8 @@ from emaviz.figures.identification import fault_bars
 from emaviz.page.compare.result import headline, motion_of, numbers
 from emaviz.page.discover import candidate
 from emaviz.page.discover.result import answer
-from emaviz.report import write_discovery_report, write_identification_report
-from emaviz.report.comparison import write_report
 from emaviz.text.results import MEANINGS, of_comparison, of_discovery, sure_words
+from emaviz.views.export import export
 
 FAILING, SLIGHT = 0.006, 0.00035  # N·m of cogging: far beyond noise; so little that a model passes outside its band
 CANDIDATES = ("cogging_torque", "constant_load", "stribeck_friction")
@@ -126,7 +123,7 @@ def texts(result: Any, write: Callable[[Path], None], page: str) -> dict[str, st
 
 @cache
 def of_comparison_texts(found: Comparison) -> dict[str, str]:
-    return texts(found, lambda path: write_report(found, path), headline(found) + numbers(found))
+    return texts(found, lambda path: export(found, path), headline(found) + numbers(found))
 
 
 # --- a comparison -----------------------------------------------------------------------------------------------------
@@ -135,7 +132,7 @@ def of_comparison_texts(found: Comparison) -> dict[str, str]:
 @pytest.mark.parametrize("case", COMPARED)
 def test_every_error_of_a_comparison_is_the_one_of_its_json(case):
     found = compared(case)
-    told, document = of_comparison_texts(found), compared_as_dict(found)
+    told, document = of_comparison_texts(found), found.to_dict()
     known = named(document, IN_FLOORS)
     for who, text in told.items():
         assert unstated(text, known) == [], who
@@ -161,7 +158,7 @@ def test_every_error_of_a_comparison_is_the_one_of_its_json(case):
 @pytest.mark.parametrize("case", COMPARED)
 def test_the_pooled_error_lies_between_those_that_it_pools(case):
     """4.84 floors beside four ratios of 1.10 and less is no mean of anything."""
-    document = compared_as_dict(compared(case))
+    document = compared(case).to_dict()
     each = [one["over_floor"] for one in document["signals"].values() if one["counted"]]
     assert each and min(each) - 1e-9 <= document["over_floor"] <= max(each) + 1e-9
     residuals = compared(case).residuals
@@ -173,7 +170,7 @@ def test_the_pooled_error_lies_between_those_that_it_pools(case):
 @pytest.mark.parametrize("case", COMPARED)
 def test_the_colours_of_a_comparison_are_those_of_its_numbers(case):
     found = compared(case)
-    document = compared_as_dict(found)
+    document = found.to_dict()
     tables = [errors(found)]
     if (each := errors_by_recording(found, found.primary)) is not None:
         tables.append(each)
@@ -215,7 +212,7 @@ def test_a_comparison_says_no_more_than_its_numbers(case):
 @pytest.mark.parametrize("case", COMPARED)
 def test_shares_are_those_of_the_residual_as_it_is(case):
     found = compared(case)
-    document = compared_as_dict(found)
+    document = found.to_dict()
     by = {(one["variable"], one["modulator"]): one["r2"] for one in document["explained_by"]}
     assert all(0.0 <= share <= 1.0 for share in by.values())
     order = list(dict.fromkeys(variable_title(one["variable"]) for one in document["explained_by"]))
@@ -243,7 +240,7 @@ def _modulators(figure: Any) -> list[str]:
 @pytest.mark.parametrize("case", COMPARED)
 def test_a_calibration_is_told_alike(case):
     found = compared(case)
-    fit, document = found.calibration, compared_as_dict(found)
+    fit, document = found.calibration, found.to_dict()
     assert fit is not None and document["calibration"] is not None
     table = calibration_table(fit, found.actuator.axes)
     assert table is not None
@@ -269,7 +266,7 @@ def test_a_calibration_is_told_alike(case):
 def of_discovery_texts(found: Discovery) -> dict[str, str]:
     look: Any = type("Shown", (), {})()
     look.found, look.assessment, look.added, look.promising = found, _nothing_left(), list(found.effects), []
-    return texts(found, lambda path: write_discovery_report(found, path), answer(look))
+    return texts(found, lambda path: export(found, path), answer(look))
 
 
 def _nothing_left() -> Any:
@@ -285,7 +282,7 @@ def _nothing_left() -> Any:
 @pytest.mark.parametrize("case", DISCOVERED)
 def test_every_error_of_a_discovery_is_the_one_of_its_json(case):
     found = discovered(case)
-    document = words.as_dict(found)
+    document = found.to_dict()
     known = named(document, ON_LADDER) + named(
         document["ladder"], ("rmse", "holdout_rmse", "recordings", "holdout_recordings")
     )
@@ -310,7 +307,7 @@ def test_every_error_of_a_discovery_is_the_one_of_its_json(case):
 
 def test_an_effects_errors_are_those_of_the_ladder():
     """They are told by the ladder, whose steps are counted anew where a fit is settled."""
-    document = words.as_dict(discovered("found"))
+    document = discovered("found").to_dict()
     [one], (before, after) = document["effects"], document["ladder"][-2:]
     assert (one["rmse_before"], one["rmse_after"]) == (before["rmse"], after["rmse"])
     assert (one["holdout_rmse_before"], one["holdout_rmse_after"]) == (before["holdout_rmse"], after["holdout_rmse"])
@@ -330,7 +327,7 @@ def test_an_effect_in_anothers_place_is_told_from_the_step_before_both():
 @pytest.mark.parametrize("case", DISCOVERED)
 def test_a_discovery_says_no_more_than_its_numbers(case):
     found = discovered(case)
-    document = words.as_dict(found)
+    document = found.to_dict()
     for error, band, nothing in ((found.ladder[-1].rmse, found.floor_band, True), (1.08, (0.96, 1.04), False)):
         if not nothing:  # as of a clean hobby rig
             found = replace(found, ladder=[*found.ladder[:-1], replace(found.ladder[-1], rmse=error)], held=None)
@@ -357,7 +354,7 @@ def test_nothing_is_missing_is_not_said_of_an_error_outside_its_band():
         "At 1.08 times the floor, where a true model's error is 0.96 to 1.04, 8 % more is left than noise explains, "
         "and no effect of the library explains it."
     )
-    assert of_discovery(told) == "warning" and not words.as_dict(told)["remaining"]["within_band"]
+    assert of_discovery(told) == "warning" and not told.to_dict()["remaining"]["within_band"]
 
 
 @cache
@@ -395,7 +392,7 @@ def test_candidates_stand_in_one_order():
     table = words.candidates(found)
     assert table is not None
     titles = [row[0] for row in table.rows]
-    assert titles == [words.effect_title(one["name"]) for one in words.as_dict(found)["candidates"]]
+    assert titles == [words.effect_title(one["name"]) for one in found.to_dict()["candidates"]]
     chart = discovery_figures.candidates(found)
     drawn = [re.sub(r"<[^>]+>", "", one) for one in chart.layout.yaxis.ticktext][::-1]
     assert drawn == titles
@@ -408,21 +405,21 @@ def test_candidates_stand_in_one_order():
 
 
 @cache
-def identified() -> tuple[Identification, Objective]:
+def identified() -> Identification:
     """A short search on a simulated run; the phases of its motor are known together alone."""
     path = str(Path(_FOLDER[0]) / "chirp.csv")
     asked = "simulate --fault k2=0.3 --duration 0.1 --noise-current 0.1 --seed 3 --out"
     assert main([*asked.split(), path]) == 0
     objective = Objective([read_measurement(path)], load_actuator())
-    return identify(objective, "do", population=4, iterations=2, polish=True), objective
+    return identify(objective, "do", population=4, iterations=2, polish=True)
 
 
 def test_an_identification_is_told_alike():
-    found, objective = identified()
-    document = identified_as_dict(found, found.actuator)
+    found = identified()
+    document = found.to_dict()
     bars = fault_bars(found.k, found.actuator, None, found.uncertainty.interval90, found.uncertainty.alarms)
     page = sure_words(found) + bars
-    told = texts(found, lambda path: write_identification_report(found, objective, path), page)
+    told = texts(found, lambda path: export(found, path), page)
     for name, k, (low, high) in zip(NAMES, document["k"], document["k_interval90"]):
         for who in ("terminal", "notebook", "report"):
             assert f"{k:.4f}" in told[who] and f"{low:.4f} … {high:.4f}" in told[who], (who, name)
@@ -449,7 +446,7 @@ def test_an_identification_is_told_alike():
 
 def test_what_is_known_only_together_holds_the_truth():
     """The play is the file's times 1 + 99 k2; both may be anything, their product was put in."""
-    found, _ = identified()
+    found = identified()
     truth = found.actuator.transmission.backlash_rad * (1.0 + 99.0 * 0.3)
     [play] = [one for one in found.uncertainty.identifiable if "k2" in one.powers]
     low, high = play.interval90

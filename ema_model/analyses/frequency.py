@@ -192,7 +192,7 @@ class FrequencyResponse(Result):
     @property
     def answer(self) -> Annotated[tuple[str, ...], Meta(description="what is found, in sentences")]:
         """As the terminal has them."""
-        return tuple(self.sentences)
+        return tuple(self.lines)
 
     @property
     def band(self) -> NDArray[np.bool_]:

@@ -6,7 +6,7 @@ import csv
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache, cached_property
-from typing import Annotated, Any, TypedDict
+from typing import Annotated, Any
 
 import numpy as np
 from msgspec import Meta
@@ -20,6 +20,7 @@ from ema_model.faults import HEALTHY, NAMES, performance_coefficient, vector
 from ema_model.files.opened import shipped_folder
 from ema_model.identification.run import ROBUST
 from ema_model.recordings import Measurement
+from ema_model.result import NULL, Result, as_named
 from ema_model.simulation.plant import simulate
 from ema_model.simulation.run import Run, simulate_monitor
 
@@ -307,14 +308,19 @@ class Missed:
 
 @dataclass(frozen=True)
 class Coefficient:
-    """T 5.4 of an algorithm: on a fault (low and high together), on `single`, or on `multiple`."""
+    """The performance coefficient of an algorithm (T 5.4): on a fault, on `single`, or on `multiple`."""
 
-    fault: str
-    algorithm: str
+    fault: Annotated[str, Meta(description="the kind of fault")]  # low and high together
+    algorithm: Annotated[str, Meta(description="ssa, hba or do")]
     error_percent: float
     time_s: float
-    percent: float
+    percent: Annotated[float, as_named("coefficient", "%, ours")]
     printed: PrintedCoefficient | None
+
+    @property
+    def thesis(self) -> Annotated[float | None, Meta(description="%, as the thesis prints it")]:
+        """Of `printed`."""
+        return None if self.printed is None else self.printed.coefficient_percent
 
 
 def scores(rows: Rows, algorithms: Sequence[str] = EVERY) -> list[Score]:
@@ -599,46 +605,47 @@ AS_THE_THESIS, FILTERED, TRADE_OFF = "thesis", "filtered", "trade_off"  # groups
 TARGET_PERCENT = 0.05  # mean Err of the robust identification over all eleven
 
 
-class ThesisRowJson(TypedDict):
+@dataclass(frozen=True)
+class ThesisRow:
     """An algorithm on one faulty actuator: means and deviations over its runs; null where there is no run."""
 
     case: Annotated[str, Meta(description="the actuator's name")]
     algorithm: Annotated[str, Meta(description="ssa, hba, do or robust")]
     runs: Annotated[int, Meta(description="how many")]
-    error_percent: Annotated[float | None, Meta(description="Err %, mean")]
-    error_deviation_percent: Annotated[float | None, Meta(description="Err %, standard deviation")]
-    error_wrapped_percent: Annotated[float | None, Meta(description="Err %, mean, with k7 as the angle that it is")]
-    time_s: Annotated[float | None, Meta(description="s of one run, mean")]
-    time_deviation_s: Annotated[float | None, Meta(description="s, standard deviation")]
+    error_percent: Annotated[float, Meta(description="Err %, mean", extra=NULL)]
+    error_deviation_percent: Annotated[float, Meta(description="Err %, standard deviation", extra=NULL)]
+    error_wrapped_percent: Annotated[
+        float, Meta(description="Err %, mean, with k7 as the angle that it is", extra=NULL)
+    ]
+    time_s: Annotated[float, Meta(description="s of one run, mean", extra=NULL)]
+    time_deviation_s: Annotated[float, Meta(description="s, standard deviation", extra=NULL)]
     thesis_error_percent: Annotated[float | None, Meta(description="Err % that the thesis prints; null: none")]
     thesis_error_deviation_percent: Annotated[float | None, Meta(description="its standard deviation, as printed")]
     thesis_time_s: Annotated[float | None, Meta(description="s that the thesis prints")]
 
-
-class CoefficientJson(TypedDict):
-    """The performance coefficient of an algorithm (T 5.4)."""
-
-    fault: Annotated[str, Meta(description="the kind of fault")]
-    algorithm: Annotated[str, Meta(description="ssa, hba or do")]
-    coefficient: Annotated[float, Meta(description="%, ours")]
-    thesis: Annotated[float | None, Meta(description="%, as the thesis prints it")]
-
-
-class EvaluationJson(TypedDict):
-    """The thesis's evaluation, computed anew, beside its printed numbers."""
-
-    mean_error_percent: Annotated[
-        dict[str, float | None], Meta(description="Err %, mean over the actuators, by algorithm")
-    ]
-    rows: Annotated[list[ThesisRowJson], Meta(description="of each actuator and algorithm")]
-    performance_coefficient_percent: Annotated[list[CoefficientJson], Meta(description="of each fault and algorithm")]
+    @classmethod
+    def of(cls, one: Score) -> ThesisRow:
+        """As the JSON form has a score."""
+        return cls(
+            case=one.case.name,
+            algorithm=one.algorithm,
+            runs=one.error.count,
+            error_percent=one.error.mean,
+            error_deviation_percent=one.error.deviation,
+            error_wrapped_percent=one.wrapped.mean,
+            time_s=one.time_s.mean,
+            time_deviation_s=one.time_s.deviation,
+            thesis_error_percent=None if one.printed is None else one.printed.mean,
+            thesis_error_deviation_percent=None if one.printed is None else one.printed.deviation,
+            thesis_time_s=one.printed_time_s,
+        )
 
 
-class Evaluation:
-    """The rows of a campaign of the plan `thesis`, and what they say together."""
+@dataclass(frozen=True, eq=False, repr=False)
+class Evaluation(Result):
+    """The thesis's evaluation, computed anew, beside its printed numbers: the rows of a campaign of its plan."""
 
-    def __init__(self, store: Store) -> None:
-        self.store = store
+    store: Store
 
     @cached_property
     def rows(self) -> list[dict[str, Any]]:
@@ -707,43 +714,27 @@ class Evaluation:
     def _computed(self, algorithm: str) -> list[Score]:
         return [one for one in self.scores if one.algorithm == algorithm and one.error.count]
 
-    def as_dict(self) -> EvaluationJson:
-        """For JSON; what there is no run of is null."""
-        return {
-            "mean_error_percent": {
-                name: _number(self.mean_error(name)) for name in dict.fromkeys(one.algorithm for one in self.scores)
-            },
-            "rows": [
-                {
-                    "case": one.case.name,
-                    "algorithm": one.algorithm,
-                    "runs": one.error.count,
-                    "error_percent": _number(one.error.mean),
-                    "error_deviation_percent": _number(one.error.deviation),
-                    "error_wrapped_percent": _number(one.wrapped.mean),
-                    "time_s": _number(one.time_s.mean),
-                    "time_deviation_s": _number(one.time_s.deviation),
-                    "thesis_error_percent": None if one.printed is None else one.printed.mean,
-                    "thesis_error_deviation_percent": None if one.printed is None else one.printed.deviation,
-                    "thesis_time_s": one.printed_time_s,
-                }
-                for one in self.scores
-            ],
-            "performance_coefficient_percent": [
-                {
-                    "fault": one.fault,
-                    "algorithm": one.algorithm,
-                    "coefficient": one.percent,
-                    "thesis": None if one.printed is None else one.printed.coefficient_percent,
-                }
-                for one in self.coefficients
-            ],
-        }
+    @property
+    def mean_error_percent(
+        self,
+    ) -> Annotated[dict[str, float], Meta(description="Err %, mean over the actuators, by algorithm", extra=NULL)]:
+        """NaN of one without a run."""
+        return {name: self.mean_error(name) for name in dict.fromkeys(one.algorithm for one in self.scores)}
+
+    @property
+    def of_each(
+        self,
+    ) -> Annotated[list[ThesisRow], as_named("rows", "of each actuator and algorithm")]:
+        """The scores."""
+        return [ThesisRow.of(one) for one in self.scores]
+
+    @property
+    def performance(
+        self,
+    ) -> Annotated[list[Coefficient], as_named("performance_coefficient_percent", "of each fault and algorithm")]:
+        """The coefficients."""
+        return self.coefficients
 
 
 def _mean(values: list[float]) -> float:
     return float(np.mean(values)) if values else float("nan")
-
-
-def _number(value: float) -> float | None:
-    return value if np.isfinite(value) else None

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from typing import Annotated
 
 import numpy as np
+from msgspec import Meta
 from numpy.typing import NDArray
 from scipy.ndimage import median_filter
 
@@ -13,6 +15,7 @@ from ema_model.comparison.residuals import Residuals, explanation_sentence
 from ema_model.quantities.axes import Axes
 from ema_model.quantities.variables import MODULATORS, VARIABLES
 from ema_model.recordings import SIGNALS
+from ema_model.result import NULL, as_named
 
 # --- least squares judged on stretches of time that were left out of the fit ------------------------------------------
 # Neighbouring blocks are alike, so whole stretches are left out, never single blocks.
@@ -239,11 +242,13 @@ _LEVEL = 0.01  # of recordings in which noise would show an order
 
 @dataclass(frozen=True)
 class Order:
-    """A sin(order·θ + phase), θ the motor's angle."""
+    """A part of a residual that repeats with the motor: amplitude · sin(order · θ + phase), θ the motor's angle."""
 
-    order: float  # periods in each turn, whole; in 2π m of a linear axis, any number
-    amplitude: float  # in the signal's unit
-    phase: float  # rad
+    order: Annotated[  # whole in each turn; in 2π m of a linear axis, any number
+        float, Meta(description="periods per revolution; rad/m where the motor's axis is linear")
+    ]
+    amplitude: Annotated[float, Meta(description="in the primary signal's unit")]
+    phase: Annotated[float, as_named("phase_rad", "rad")]
     significance: float  # χ² of 2 degrees of freedom that noise of the same colour would give 2 of, on average
 
     def is_significant(self, tried: int = HIGHEST_ORDER, level: float = _LEVEL) -> bool:
@@ -384,24 +389,29 @@ _FINALISTS = 6
 
 @dataclass(frozen=True, eq=False)
 class Explanation:
-    """How much of a signal's residual one variable, times a modulator, tells ahead on data it was not fitted to.
+    """How much of a residual one variable, times a modulator, tells ahead on data it was not fitted to.
 
     The residual is modulator × curve(variable); the modulator is 1, the current, or the sign of the speed.
     """
 
-    signal: str
-    variable: str
-    modulator: str  # "1", "current", "sign_speed"
+    signal: Annotated[str, Meta(description="whose residual it is")]
+    variable: Annotated[str, Meta(description="motor_angle, user_position, motor_speed, acceleration, current, …")]
+    modulator: Annotated[str, Meta(description="what the curve is multiplied by: 1, current or sign_speed")]
     r2: float  # cross-validated share of the residual's power as it is, noise and floor within it, at most 1
-    significant: bool
+    significant: Annotated[bool, Meta(description="whether noise alone would seldom show as much")]
     centres: Array  # (bins,) of the variable, in its unit (the angle from 0 to 2π)
     curve: Array  # (bins,) mean residual over modulator, in the signal's unit (over A for the current)
     error: Array  # (bins,) its standard error
-    sentence: str  # "The residual current repeats with the motor's angle."
+    sentence: Annotated[str, Meta(description="the same in words")]
     beyond_noise: float = 0.0  # the share of the power beyond noise and floor alone, −1 … 1
 
     @property
-    def share(self) -> float:
+    def share(
+        self,
+    ) -> Annotated[
+        float,
+        as_named("r2", "share of the residual's power as it is, cross-validated; shares overlap", **NULL),
+    ]:
         """Of the residual's power as it is, 0 … 1, as all that show it say it; what tells nothing ahead has none."""
         return min(1.0, max(0.0, self.r2))
 

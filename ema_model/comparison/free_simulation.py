@@ -11,17 +11,20 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
+from msgspec import Meta
 from numpy.typing import NDArray
 
 from ema_model.actuator import Actuator
 from ema_model.errors import InputError
 from ema_model.models import Model, Window
 from ema_model.models.open_loop import FreeMotion, free_motion
-from ema_model.quantities.axes import of_signal
+from ema_model.quantities.axes import SIGNALS, of_signal
 from ema_model.quantities.titles import in_sentence
 from ema_model.recordings import Measurement
+from ema_model.result import NULL
 
 Array = NDArray[np.float64]
 Pair = tuple[Array, Array]  # measured and simulated, (n,) each
@@ -50,6 +53,47 @@ class Simulated:
     fitted: Score
     holdout: Score | None = None  # of recordings that were not fitted; None where there are none
     at_fitted_offset: Score | None = None  # of the same in open loop, with the fitted recordings' offset, not their own
+
+
+@dataclass(frozen=True)
+class FreeError:
+    """How far the model is from one signal when it runs freely from the recordings' first state on."""
+
+    rmse: Annotated[float, Meta(description="rms error over all fitted recordings; null: see reason", extra=NULL)]
+    mae: Annotated[float, Meta(description="mean absolute error, likewise", extra=NULL)]
+    percent_of_range: Annotated[float, Meta(description="rmse, % of the measured signal's range", extra=NULL)]
+    reason: Annotated[str, Meta(description="why there is no number; empty where there is one")]
+    holdout_rmse: Annotated[float, Meta(description="rmse of recordings that were not fitted; null: none", extra=NULL)]
+    holdout_mae: Annotated[float, Meta(description="mae of the same", extra=NULL)]
+    holdout_percent_of_range: Annotated[float, Meta(description="percent_of_range of the same", extra=NULL)]
+    holdout_reason: Annotated[str, Meta(description="why there is no number of those that were held out")]
+    holdout_rmse_at_fitted_offset: Annotated[
+        float,
+        Meta(
+            description="holdout_rmse in open loop with the fitted recordings' offset, not with their own", extra=NULL
+        ),
+    ]
+    unit: Annotated[str, Meta(description="of rmse and mae")]
+
+
+def errors_in_units(simulation: Mapping[str, Simulated]) -> dict[str, FreeError]:
+    """The free simulation's errors by signal, in the signals' units."""
+    found = {}
+    for name, one in simulation.items():
+        held, same = one.holdout or without(""), one.at_fitted_offset or without("")
+        found[name] = FreeError(
+            rmse=one.fitted.rmse,
+            mae=one.fitted.mae,
+            percent_of_range=one.fitted.percent_of_range,
+            reason=one.fitted.reason,
+            holdout_rmse=held.rmse,
+            holdout_mae=held.mae,
+            holdout_percent_of_range=held.percent_of_range,
+            holdout_reason=held.reason,
+            holdout_rmse_at_fitted_offset=same.rmse,
+            unit=SIGNALS[name].unit,
+        )
+    return found
 
 
 def scored(fitted: Mapping[str, Pair], holdout: Mapping[str, Pair]) -> dict[str, Simulated]:

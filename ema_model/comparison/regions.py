@@ -6,8 +6,10 @@ from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
+from typing import Annotated
 
 import numpy as np
+from msgspec import Meta
 from numpy.typing import NDArray
 
 from ema_model.actuator import Actuator
@@ -25,6 +27,7 @@ from ema_model.comparison.explain import Explanation, modulator_of, quantile_kno
 from ema_model.comparison.residuals import Residuals, event_sentence, range_text, region_sentence
 from ema_model.quantities.axes import Axes
 from ema_model.recordings import SIGNALS
+from ema_model.result import NULL, as_named
 
 # --- the worst regions: ranges of a variable in which the residual stands out of its floor most, one way --------------
 
@@ -45,14 +48,16 @@ _DIGITS = (3, 4, 5, 6)  # of the ends of a range, as many as tell it from anothe
 class Region:
     """A range of a variable in which the model fails most."""
 
-    signal: str
-    variable: str
-    low: float
-    high: float
-    rmse: float  # in the signal's unit
-    mean: float  # of the residual, likewise
-    excess: float  # rms of the error over the floor there
-    sentence: str  # "The motor needs 35.2 mN·m more torque at 300 rad/s than the model."
+    signal: Annotated[str, Meta(description="whose residual it is")]
+    variable: Annotated[str, Meta(description="what the range is of: motor_speed, time, …")]
+    low: Annotated[float, as_named("from", "where the range begins, in the variable's SI unit")]
+    high: Annotated[float, as_named("to", "where it ends, likewise")]
+    rmse: Annotated[float, Meta(description="of the residual there, in the signal's unit", extra=NULL)]
+    mean: Annotated[
+        float, Meta(description="of the residual there, measurement − model, in the signal's unit", extra=NULL)
+    ]
+    excess: Annotated[float, as_named("over_floor", "rms of the error over the floor there", **NULL)]
+    sentence: Annotated[str, Meta(description="the same in words")]  # "The motor needs 35.2 mN·m more torque at …"
     blocks: NDArray[np.bool_]  # (blocks,) of the joined residuals
 
 
@@ -204,17 +209,17 @@ _STRETCHES = 24  # of a recording, over which what is left is taken to be indepe
 
 @dataclass(frozen=True, eq=False)
 class Event:
-    """A step of a signal's residual within one recording."""
+    """A step of a residual at one moment of a recording."""
 
     recording: int  # from 0
-    name: str  # the recording's
-    signal: str  # as on the actuator's axes
-    time_s: float  # as recorded
-    change: float  # after less before, in the signal's unit
-    by_direction: bool  # whether it turns over with the direction of motion, as friction does
-    share: float  # of what is left of the signal beyond its floor in that recording
+    name: Annotated[str, as_named("recording", "its name")]
+    signal: Annotated[str, Meta(description="whose residual it is")]  # as on the actuator's axes
+    time_s: Annotated[float, Meta(description="s, as recorded")]
+    change: Annotated[float, Meta(description="after less before, in the signal's unit")]
+    by_direction: Annotated[bool, Meta(description="whether it turns over with the direction of motion, as friction")]
+    share: Annotated[float, Meta(description="0 … 1, of what the signal's residual has beyond its floor")]
     gain: float  # of χ² over the floor
-    sentence: str
+    sentence: Annotated[str, Meta(description="the same in words")]
 
 
 def events(residuals: Residuals, signals: Sequence[str], names: Sequence[str], actuator: Actuator) -> list[Event]:

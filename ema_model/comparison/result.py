@@ -1,68 +1,89 @@
-"""What a comparison finds: the result, its words, its JSON."""
+"""What a comparison finds: the result, and its words."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Annotated, TypedDict
+from typing import Annotated
 
 import numpy as np
 from msgspec import Meta
 from numpy.typing import NDArray
 
+from ema_model.actuator import Actuator
 from ema_model.actuator.parameters import on_axes
 from ema_model.comparison.error_in_floors import UNKNOWN, OverFloor
-from ema_model.comparison.explain import Explanation
-from ema_model.comparison.free_simulation import Score, Simulated, without
+from ema_model.comparison.explain import Explanation, Order
+from ema_model.comparison.free_simulation import FreeError, Score, Simulated, errors_in_units, without
 from ema_model.comparison.regions import Event, Region
 from ema_model.comparison.residuals import Residuals, dependence
-from ema_model.estimation.calibrate import (
-    Calibrated,
-    Calibration,
-    CombinationJson,
-    calibration_table,
-    combinations,
-    together,
-)
-from ema_model.quantities.axes import ROTARY, SIGNALS, Axes, of_residual, of_signal
-from ema_model.quantities.numbers import IntervalJson, Quantity, number, plain
+from ema_model.estimation.calibrate import Calibration, KnownTogether, calibration_table, combinations, together
+from ema_model.quantities.axes import ROTARY, Axes, of_residual, of_signal
+from ema_model.quantities.numbers import Quantity, number
 from ema_model.quantities.titles import all_of, in_sentence
 from ema_model.quantities.variables import of_variable
-from ema_model.recordings.health import HealthJson
+from ema_model.recordings import Measurement
+from ema_model.recordings.health import Health
 from ema_model.recordings.noise import least_noise
-from ema_model.text import Document, InWords, Lines, Note, Table
-
-if TYPE_CHECKING:
-    from ema_model.actuator import Actuator
-    from ema_model.comparison.explain import Order
-    from ema_model.comparison.free_simulation import Simulated
-    from ema_model.comparison.regions import Event
-    from ema_model.estimation.calibrate import Calibration
-    from ema_model.recordings import Measurement
-    from ema_model.recordings.health import Health
-
+from ema_model.result import NULL, Result, as_named
+from ema_model.text import Document, Lines, Note, Table
 
 # --- what a comparison finds, in the words and numbers that the screen, the report and JSON show ----------------------
 
 Array = NDArray[np.float64]
+Band = tuple[float, float]
 
 COMPARISON_VERDICTS = ("adequate", "not_adequate", "uninformative")
 
 
 @dataclass(frozen=True)
 class SignalError:
-    """How far the model is from one signal over all recordings, in the signal's unit."""
+    """How far the model is from one signal, in the unit that ends the signal's name."""
 
-    rmse: float
-    rmse_initial: float  # before calibration
-    nrmse: float  # rmse over the range of the measured signal
-    noise_floor: float  # noise and model floor, rms
-    mean_absolute: float
+    rmse: Annotated[float, Meta(description="root mean square of measurement − model; null: it diverges", extra=NULL)]
+    rmse_initial: Annotated[
+        float, Meta(description="rmse before the calibration, with the file's parameters", extra=NULL)
+    ]
+    nrmse: Annotated[
+        float, Meta(description="rmse over the range of the measured signal; null: it is constant", extra=NULL)
+    ]
+    noise_floor: Annotated[
+        float, Meta(description="rms that a perfect model would leave: noise and model floor", extra=NULL)
+    ]
+    mean_absolute: Annotated[float, Meta(description="mean of |measurement − model|", extra=NULL)]
     signal_rms: float = math.nan  # of what was measured; of a position about its mean
     silent: str = ""  # why the signal tells nothing of the model, as of `estimation.floor.tells_nothing`
     in_floors: OverFloor = UNKNOWN  # the error over the floor of the same moment; no quotient of the numbers above
-    is_counted: bool = True  # whether it is one of those whose errors in floors are pooled
+    is_counted: Annotated[
+        bool, as_named("counted", "whether the pooled over_floor counts it; a speed beside a position: no")
+    ] = True
+
+    @property
+    def over_floor(
+        self,
+    ) -> Annotated[
+        float,
+        Meta(description="rms of the error over the floor of the same moment; null: none is known", extra=NULL),
+    ]:
+        """As `in_floors` has it."""
+        return self.in_floors.error
+
+    @property
+    def floor_band(
+        self,
+    ) -> Annotated[Band, Meta(description="between which over_floor of nine of ten true models lies", extra=NULL)]:
+        """As `in_floors` has it."""
+        return self.in_floors.band
+
+    @property
+    def informative(
+        self,
+    ) -> Annotated[
+        bool, Meta(description="false: the signal is constant, or no larger than its floor, and tells nothing")
+    ]:
+        """Whether it is not silent."""
+        return not self.silent
 
     def in_words(self, signal: Quantity) -> str:
         """'equivalent current 42.1 mA rms'."""
@@ -77,43 +98,56 @@ class SignalError:
 class Compared:
     """One recording beside the model; all arrays are (blocks,)."""
 
-    name: str
+    name: Annotated[str, Meta(description="the file's name without its ending, #N for the run N of a file")]
     measurement: Measurement  # as it was compared
-    health: Health
+    health: Annotated[Health, Meta(description="what its own numbers say of its quality")]
     time_s: Array
     measured: dict[str, Array]
     initial: dict[str, Array]  # the model with the file's parameters
     model: dict[str, Array]  # the model after calibration (the same without one)
     sigma: dict[str, Array]  # standard deviation that a perfect model would leave
-    errors: dict[str, SignalError]
+    errors: Annotated[dict[str, SignalError], as_named("signals", "its errors, by signal")]
+
+    @property
+    def notes(self) -> Annotated[Sequence[str], Meta(description="what reading it found and did")]:
+        """Of the measurement."""
+        return self.measurement.notes
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Comparison(InWords):
-    """All of it: the recordings one by one, and what they say together."""
+class Comparison(Result):
+    """Where the model fails beside the recordings of one actuator."""
 
     actuator: Actuator  # as given
-    calibration: Calibration | None
-    recordings: Sequence[Compared]
+    calibration: Annotated[Calibration | None, Meta(description="null where none was asked for")]
+    recordings: Annotated[Sequence[Compared], Meta(description="those that were fitted, one by one")]
     residuals: Residuals  # joined
-    signals: dict[str, SignalError]
-    primary: str  # the signal whose residual is explained
-    explained_by: Sequence[Explanation]  # best first
-    orders: Sequence[Order]  # of the primary signal, strongest first; significant ones only
-    worst_regions: Sequence[Region]  # worst first
-    adequate: bool
-    over_floor: float  # error in floors, pooled over signals
-    floor_band: tuple[float, float]  # between which nine of ten true models' lie
-    sentences: Sequence[str]  # the answer in plain words, the first one first
-    warnings: Sequence[str] = field(default_factory=tuple)
-    events: Sequence[Event] = field(default_factory=tuple)  # what happened at one moment of a recording
-    holdout: Sequence[Compared] = field(default_factory=tuple)  # not fitted, beside the calibrated model
+    signals: Annotated[dict[str, SignalError], Meta(description="errors over all fitted recordings, by signal")]
+    primary: Annotated[str, Meta(description="the signal whose residual is explained")]
+    explained_by: Annotated[Sequence[Explanation], Meta(description="what goes with the primary residual, best first")]
+    orders: Annotated[Sequence[Order], Meta(description="of the primary residual, strongest first; significant ones")]
+    worst_regions: Annotated[Sequence[Region], Meta(description="where the model fails most, worst first")]
+    adequate: Annotated[bool, Meta(description="whether what is left may be noise and the model's own floor")]
+    over_floor: Annotated[
+        float, Meta(description="rms error pooled over signals, in units of the floor; 1 is the floor", extra=NULL)
+    ]
+    floor_band: Annotated[Band, Meta(description="between which over_floor of nine of ten true models lies")]
+    sentences: Annotated[Sequence[str], Meta(description="the answer in words, the first one first")]
+    warnings: Annotated[Sequence[str], Meta(description="what the answer must be read with")] = ()
+    events: Annotated[Sequence[Event], Meta(description="what happened at one moment")] = ()
+    holdout: Annotated[
+        Sequence[Compared], Meta(description="those that were not fitted, beside the calibrated model")
+    ] = ()
     unseen: OverFloor | None = None  # the pooled error of what was held out; None without any
     uninformative: bool = False  # the recordings tell nothing of the model, so that it is not adequate either
     simulation: Mapping[str, Simulated] = field(default_factory=dict)  # of the model running freely, by signal
 
+    def name_in_files(self, name: str) -> str:
+        """A parameter's path on the actuator's axes."""
+        return on_axes(name, self.actuator.axes).path
+
     @property
-    def verdict(self) -> str:
+    def verdict(self) -> Annotated[str, Meta(description=f"one of {', '.join(COMPARISON_VERDICTS)}")]:
         """One of `COMPARISON_VERDICTS`."""
         return "uninformative" if self.uninformative else "adequate" if self.adequate else "not_adequate"
 
@@ -123,10 +157,44 @@ class Comparison(InWords):
         return OverFloor(self.over_floor, self.floor_band)
 
     @property
-    def is_within_band(self) -> bool:
+    def is_within_band(
+        self,
+    ) -> Annotated[
+        bool,
+        as_named("within_band", "whether no error is above its band: pooled, of the primary signal, held out"),
+    ]:
         """Whether no error is above its band: that of all signals, of the explained one, of what was held out."""
         told = [self.in_floors, self.signals[self.primary].in_floors, *([] if self.unseen is None else [self.unseen])]
         return not any(one.is_above for one in told)
+
+    @property
+    def holdout_over_floor(
+        self,
+    ) -> Annotated[float | None, Meta(description="over_floor of what was not fitted; null: nothing was held out")]:
+        """As `unseen` has it."""
+        return None if self.unseen is None else self.unseen.error
+
+    @property
+    def holdout_floor_band(self) -> Annotated[Band | None, Meta(description="floor_band of the same")]:
+        """As `unseen` has it."""
+        return None if self.unseen is None else self.unseen.band
+
+    @property
+    def identifiable(
+        self,
+    ) -> Annotated[list[KnownTogether], Meta(description="what the recordings tell only together")]:
+        """Of the calibration."""
+        return [] if self.calibration is None else combinations(self.calibration.identifiable, self.actuator.axes)
+
+    @property
+    def free_errors(
+        self,
+    ) -> Annotated[
+        dict[str, FreeError],
+        as_named("simulation", "of the model running freely, driven by the command, or in open loop; by signal"),
+    ]:
+        """Of `simulation`, by signal."""
+        return errors_in_units(self.simulation)
 
 
 # --- a comparison in words: its sentences, the errors, what explains them, the calibration ----------------------------
@@ -323,324 +391,3 @@ def _why(result: Comparison) -> Iterator[Table | Lines | Note]:
     if result.calibration is not None and (table := calibration_table(result.calibration, axes)) is not None:
         yield table
         yield from map(Note, together(result.calibration, axes))
-
-
-# --- a comparison in plain numbers, as `emaviz compare --json` writes it ----------------------------------------------
-# What each field means, and where it is from.
-
-
-class SignalErrorJson(TypedDict):
-    """How far the model is from one signal, in the unit that ends the signal's name."""
-
-    rmse: Annotated[float | None, Meta(description="root mean square of measurement − model; null: it diverges")]
-    nrmse: Annotated[float | None, Meta(description="rmse over the range of the measured signal; null: it is constant")]
-    noise_floor: Annotated[
-        float | None, Meta(description="rms that a perfect model would leave: noise and model floor")
-    ]
-    rmse_initial: Annotated[float | None, Meta(description="rmse before the calibration, with the file's parameters")]
-    mean_absolute: Annotated[float | None, Meta(description="mean of |measurement − model|")]
-    over_floor: Annotated[
-        float | None, Meta(description="rms of the error over the floor of the same moment; null: none is known")
-    ]
-    floor_band: Annotated[
-        list[float | None], Meta(description="between which over_floor of nine of ten true models lies")
-    ]
-    counted: Annotated[bool, Meta(description="whether the pooled over_floor counts it; a speed beside a position: no")]
-    informative: Annotated[
-        bool, Meta(description="false: the signal is constant, or no larger than its floor, and tells nothing")
-    ]
-
-
-class SimulatedJson(TypedDict):
-    """How far the model is from one signal when it runs freely from the recordings' first state on."""
-
-    rmse: Annotated[float | None, Meta(description="rms error over all fitted recordings; null: see reason")]
-    mae: Annotated[float | None, Meta(description="mean absolute error, likewise")]
-    percent_of_range: Annotated[float | None, Meta(description="rmse, % of the measured signal's range")]
-    reason: Annotated[str, Meta(description="why there is no number; empty where there is one")]
-    holdout_rmse: Annotated[float | None, Meta(description="rmse of recordings that were not fitted; null: none")]
-    holdout_mae: Annotated[float | None, Meta(description="mae of the same")]
-    holdout_percent_of_range: Annotated[float | None, Meta(description="percent_of_range of the same")]
-    holdout_reason: Annotated[str, Meta(description="why there is no number of those that were held out")]
-    holdout_rmse_at_fitted_offset: Annotated[
-        float | None,
-        Meta(description="holdout_rmse in open loop with the fitted recordings' offset, not with their own"),
-    ]
-    unit: Annotated[str, Meta(description="of rmse and mae")]
-
-
-class ParameterJson(TypedDict):
-    """A calibrated parameter, in its `unit`."""
-
-    value: Annotated[float, Meta(description="what was found")]
-    initial: Annotated[float, Meta(description="what the actuator's file says")]
-    interval90: Annotated[
-        IntervalJson | None, Meta(description="the ends of the 90 % interval about value; null: see from_file")
-    ]
-    from_file: Annotated[bool, Meta(description="whether the recordings tell nothing beyond the file's tolerance")]
-    unit: Annotated[str, Meta(description="of value, initial and interval90; empty for a ratio")]
-    z: Annotated[float, Meta(description="value − initial, in σ of the file's tolerance")]
-    at_bound: Annotated[bool, Meta(description="whether the fit ended at the end of what is allowed")]
-
-
-class CalibrationJson(TypedDict):
-    """The fit of the actuator's parameters within their tolerances."""
-
-    converged: Annotated[bool, Meta(description="whether several starts end in the same minimum")]
-    evaluations: Annotated[int, Meta(description="how many times the recordings were simulated")]
-    parameters: Annotated[
-        dict[str, ParameterJson], Meta(description="by the names in the actuator's file, section.name, and k1 … k8")
-    ]
-    starts: Annotated[
-        dict[str, ParameterJson],
-        Meta(
-            description="of the recordings: turned N is the motor's offset at the start, faster N its speed's, pull N "
-            "that of the torque that its drive asked for, play N where in the backlash it was, lag N by how much later "
-            "than the positions the current was recorded"
-        ),
-    ]
-    outside_tolerance: Annotated[list[str], Meta(description="parameters that end at the edge of their tolerance")]
-    confounded: Annotated[list[list[str]], Meta(description="pairs of parameters that are known only together")]
-
-
-class ExplanationJson(TypedDict):
-    """How much of a residual one variable tells ahead, times a modulator."""
-
-    variable: Annotated[str, Meta(description="motor_angle, user_position, motor_speed, acceleration, current, …")]
-    modulator: Annotated[str, Meta(description="what the curve is multiplied by: 1, current or sign_speed")]
-    r2: Annotated[
-        float | None, Meta(description="share of the residual's power as it is, cross-validated; shares overlap")
-    ]
-    significant: Annotated[bool, Meta(description="whether noise alone would seldom show as much")]
-    signal: Annotated[str, Meta(description="whose residual it is")]
-    sentence: Annotated[str, Meta(description="the same in words")]
-
-
-class OrderJson(TypedDict):
-    """A part of the primary residual that repeats with the motor: amplitude · sin(order · θ + phase)."""
-
-    order: Annotated[float, Meta(description="periods per revolution; rad/m where the motor's axis is linear")]
-    amplitude: Annotated[float, Meta(description="in the primary signal's unit")]
-    phase_rad: Annotated[float, Meta(description="rad")]
-
-
-_Range = TypedDict(
-    "_Range",
-    {
-        "from": Annotated[float, Meta(description="where the range begins, in the variable's SI unit")],
-        "to": Annotated[float, Meta(description="where it ends, likewise")],
-    },
-)
-
-
-class RegionJson(_Range):
-    """A range of a variable in which the model fails most."""
-
-    signal: Annotated[str, Meta(description="whose residual it is")]
-    variable: Annotated[str, Meta(description="what the range is of: motor_speed, time, …")]
-    rmse: Annotated[float | None, Meta(description="of the residual there, in the signal's unit")]
-    mean: Annotated[float | None, Meta(description="of the residual there, measurement − model, in the signal's unit")]
-    over_floor: Annotated[float | None, Meta(description="rms of the error over the floor there")]
-    sentence: Annotated[str, Meta(description="the same in words")]
-
-
-class EventJson(TypedDict):
-    """A step of a residual at one moment of a recording."""
-
-    recording: Annotated[str, Meta(description="its name")]
-    time_s: Annotated[float, Meta(description="s, as recorded")]
-    signal: Annotated[str, Meta(description="whose residual it is")]
-    change: Annotated[float, Meta(description="after less before, in the signal's unit")]
-    by_direction: Annotated[bool, Meta(description="whether it turns over with the direction of motion, as friction")]
-    share: Annotated[float, Meta(description="0 … 1, of what the signal's residual has beyond its floor")]
-    sentence: Annotated[str, Meta(description="the same in words")]
-
-
-class HeldOutJson(TypedDict):
-    """One recording beside the model."""
-
-    name: Annotated[str, Meta(description="the file's name without its ending, #N for the run N of a file")]
-    signals: Annotated[dict[str, SignalErrorJson], Meta(description="its errors, by signal")]
-
-
-class ComparedJson(HeldOutJson):
-    """One fitted recording beside the model."""
-
-    notes: Annotated[list[str], Meta(description="what reading it found and did")]
-    health: Annotated[HealthJson, Meta(description="what its own numbers say of its quality")]
-
-
-class ComparisonJson(TypedDict):
-    """Where the model fails beside the recordings of one actuator."""
-
-    verdict: Annotated[str, Meta(description=f"one of {', '.join(COMPARISON_VERDICTS)}")]
-    adequate: Annotated[bool, Meta(description="whether what is left may be noise and the model's own floor")]
-    over_floor: Annotated[
-        float | None, Meta(description="rms error pooled over signals, in units of the floor; 1 is the floor")
-    ]
-    floor_band: Annotated[list[float], Meta(description="between which over_floor of nine of ten true models lies")]
-    within_band: Annotated[
-        bool,
-        Meta(description="whether no error is above its band: pooled, of the primary signal, held out"),
-    ]
-    holdout_over_floor: Annotated[
-        float | None, Meta(description="over_floor of what was not fitted; null: nothing was held out")
-    ]
-    holdout_floor_band: Annotated[list[float] | None, Meta(description="floor_band of the same")]
-    sentences: Annotated[list[str], Meta(description="the answer in words, the first one first")]
-    warnings: Annotated[list[str], Meta(description="what the answer must be read with")]
-    signals: Annotated[dict[str, SignalErrorJson], Meta(description="errors over all fitted recordings, by signal")]
-    primary: Annotated[str, Meta(description="the signal whose residual is explained")]
-    calibration: Annotated[CalibrationJson | None, Meta(description="null where none was asked for")]
-    identifiable: Annotated[list[CombinationJson], Meta(description="what the recordings tell only together")]
-    explained_by: Annotated[list[ExplanationJson], Meta(description="what goes with the primary residual, best first")]
-    orders: Annotated[list[OrderJson], Meta(description="of the primary residual, strongest first; significant ones")]
-    worst_regions: Annotated[list[RegionJson], Meta(description="where the model fails most, worst first")]
-    events: Annotated[list[EventJson], Meta(description="what happened at one moment")]
-    simulation: Annotated[
-        dict[str, SimulatedJson],
-        Meta(description="of the model running freely, driven by the command, or in open loop; by signal"),
-    ]
-    recordings: Annotated[list[ComparedJson], Meta(description="those that were fitted, one by one")]
-    holdout: Annotated[list[HeldOutJson], Meta(description="those that were not fitted, beside the calibrated model")]
-
-
-def as_dict(comparison: Comparison) -> ComparisonJson:
-    """Everything but the series, in numbers and texts that JSON can hold; unknown numbers are None."""
-    document: ComparisonJson = {
-        "verdict": comparison.verdict,
-        "adequate": comparison.adequate,
-        "over_floor": comparison.over_floor,
-        "floor_band": list(comparison.floor_band),
-        "within_band": comparison.is_within_band,
-        "holdout_over_floor": None if comparison.unseen is None else comparison.unseen.error,
-        "holdout_floor_band": None if comparison.unseen is None else list(comparison.unseen.band),
-        "sentences": list(comparison.sentences),
-        "warnings": list(comparison.warnings),
-        "signals": {name: _error(error) for name, error in comparison.signals.items()},
-        "primary": comparison.primary,
-        "calibration": None
-        if comparison.calibration is None
-        else calibration_dict(comparison.calibration, comparison.actuator.axes),
-        "identifiable": combinations(
-            () if comparison.calibration is None else comparison.calibration.identifiable, comparison.actuator.axes
-        ),
-        "explained_by": [
-            {
-                "variable": one.variable,
-                "modulator": one.modulator,
-                "r2": one.share,
-                "significant": one.significant,
-                "signal": one.signal,
-                "sentence": one.sentence,
-            }
-            for one in comparison.explained_by
-        ],
-        "orders": [
-            {"order": one.order, "amplitude": one.amplitude, "phase_rad": one.phase} for one in comparison.orders
-        ],
-        "worst_regions": [_region(one) for one in comparison.worst_regions],
-        "events": [event_dict(one) for one in comparison.events],
-        "simulation": simulation_dict(comparison.simulation),
-        "recordings": [_compared(one) for one in comparison.recordings],
-        "holdout": [{"name": one.name, "signals": _errors_of(one)} for one in comparison.holdout],
-    }
-    return plain(document)
-
-
-def _region(one: Region) -> RegionJson:
-    return {
-        "signal": one.signal,
-        "variable": one.variable,
-        "from": one.low,
-        "to": one.high,
-        "rmse": one.rmse,
-        "mean": one.mean,
-        "over_floor": one.excess,
-        "sentence": one.sentence,
-    }
-
-
-def _compared(one: Compared) -> ComparedJson:
-    return {
-        "name": one.name,
-        "notes": list(one.measurement.notes),
-        "health": one.health.as_dict(),
-        "signals": _errors_of(one),
-    }
-
-
-def _errors_of(one: Compared) -> dict[str, SignalErrorJson]:
-    return {name: _error(error) for name, error in one.errors.items()}
-
-
-def event_dict(one: Event) -> EventJson:
-    """A step at one moment of a recording."""
-    return {
-        "recording": one.name,
-        "time_s": one.time_s,
-        "signal": one.signal,
-        "change": one.change,
-        "by_direction": one.by_direction,
-        "share": one.share,
-        "sentence": one.sentence,
-    }
-
-
-def simulation_dict(simulation: Mapping[str, Simulated]) -> dict[str, SimulatedJson]:
-    """The free simulation's errors by signal; numbers that are not known are NaN."""
-    found: dict[str, SimulatedJson] = {}
-    for name, one in simulation.items():
-        held = one.holdout or without("")
-        found[name] = {
-            "rmse": one.fitted.rmse,
-            "mae": one.fitted.mae,
-            "percent_of_range": one.fitted.percent_of_range,
-            "reason": one.fitted.reason,
-            "holdout_rmse": held.rmse,
-            "holdout_mae": held.mae,
-            "holdout_percent_of_range": held.percent_of_range,
-            "holdout_reason": held.reason,
-            "holdout_rmse_at_fitted_offset": (one.at_fitted_offset or without("")).rmse,
-            "unit": SIGNALS[name].unit,
-        }
-    return found
-
-
-def _error(error: SignalError) -> SignalErrorJson:
-    return {
-        "rmse": error.rmse,
-        "nrmse": error.nrmse,
-        "noise_floor": error.noise_floor,
-        "rmse_initial": error.rmse_initial,
-        "mean_absolute": error.mean_absolute,
-        "over_floor": error.in_floors.error,
-        "floor_band": list(error.in_floors.band),
-        "counted": error.is_counted,
-        "informative": not error.silent,
-    }
-
-
-def calibration_dict(calibration: Calibration, axes: Axes) -> CalibrationJson:
-    """A calibration's parameters by the names in files."""
-    return {
-        "converged": calibration.converged,
-        "evaluations": calibration.evaluations,
-        "parameters": {on_axes(name, axes).path: parameter_dict(one) for name, one in calibration.parameters.items()},
-        "starts": {name: parameter_dict(one) for name, one in calibration.starts.items()},
-        "outside_tolerance": [on_axes(name, axes).path for name in calibration.outside_tolerance],
-        "confounded": [[on_axes(a, axes).path, on_axes(b, axes).path] for a, b in calibration.confounded],
-    }
-
-
-def parameter_dict(one: Calibrated) -> ParameterJson:
-    """One calibrated parameter."""
-    return {
-        "value": one.value,
-        "initial": one.initial,
-        "interval90": None if one.from_file else list(one.interval90),
-        "from_file": one.from_file,
-        "unit": one.unit,
-        "z": one.z,
-        "at_bound": one.at_bound,
-    }

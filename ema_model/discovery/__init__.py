@@ -7,7 +7,6 @@ from ema_model.discovery.discover import discover, result_of, settings_of
 from ema_model.discovery.history import Story
 from ema_model.discovery.result import Added, Candidate, Discovery, Experiment, Rung
 from ema_model.discovery.verify import Verified, verified
-from ema_model.discovery.words import as_dict
 
 __all__ = [
     "Added",
@@ -17,7 +16,6 @@ __all__ = [
     "Rung",
     "Story",
     "Verified",
-    "as_dict",
     "begun",
     "discover",
     "result_of",

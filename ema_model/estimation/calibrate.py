@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Annotated, TypedDict
+from typing import Annotated
 
 import numpy as np
 from msgspec import Meta
@@ -31,10 +31,13 @@ from ema_model.faults import FACTORS, NAMES, named
 from ema_model.models import Model
 from ema_model.models.model import Signals
 from ema_model.quantities.axes import Axes
-from ema_model.quantities.numbers import HALF_90, IntervalJson, number, with_uncertainty
+from ema_model.quantities.numbers import HALF_90, number, with_uncertainty
 from ema_model.quantities.titles import in_sentence
+from ema_model.result import NAME, as_named
 from ema_model.side_by_side import windows
 from ema_model.text import Severity, Table
+
+Interval = tuple[float, float]
 
 # --- which of an actuator's free parameters a recording tells of, and which it cannot separate ------------------------
 # By the Fisher information of the calibration: F = JᵀJ of the signals over their floors, in units of each parameter's
@@ -244,26 +247,19 @@ def product_in_words(one: Combination, axes: Axes) -> str:
     return f"{' · '.join(above)}{divided}"
 
 
-class CombinationJson(TypedDict):
+@dataclass(frozen=True)
+class KnownTogether:
     """Parameters that are known only together, as the product of their powers."""
 
-    members: Annotated[dict[str, int], Meta(description="powers by the names in the actuator's file")]
+    members: Annotated[dict[str, int], Meta(description="powers by the names in the actuator's file", extra=NAME)]
     combination: Annotated[str, Meta(description="the product in words")]
     value: Annotated[float, Meta(description="of the product, in SI units")]
-    interval90: Annotated[IntervalJson, Meta(description="the ends of the 90 % interval about value")]
+    interval90: Annotated[Interval, Meta(description="the ends of the 90 % interval about value")]
 
 
-def combinations(known: Sequence[Combination], axes: Axes) -> list[CombinationJson]:
-    """What is known only together, by the names in files."""
-    return [
-        {
-            "members": {on_axes(name, axes).path: power for name, power in one.powers.items()},
-            "combination": product_in_words(one, axes),
-            "value": one.value,
-            "interval90": list(one.interval90),
-        }
-        for one in known
-    ]
+def combinations(known: Sequence[Combination], axes: Axes) -> list[KnownTogether]:
+    """What is known only together, with its words."""
+    return [KnownTogether(one.powers, product_in_words(one, axes), one.value, one.interval90) for one in known]
 
 
 def _title(path: str, axes: Axes) -> str:
@@ -282,17 +278,28 @@ _MISFIT = 25.0  # χ² per value, from which on the model misses by far
 
 @dataclass(frozen=True)
 class Calibrated:
-    """What a parameter was found to be."""
+    """A calibrated parameter, in its `unit`."""
 
-    value: float
-    initial: float  # the file's
-    interval90: tuple[float, float]
-    unit: str
-    z: float  # σ from the file's value
-    at_bound: bool
+    value: Annotated[float, Meta(description="what was found")]
+    initial: Annotated[float, Meta(description="what the actuator's file says")]
+    interval90: Interval
+    unit: Annotated[str, Meta(description="of value, initial and interval90; empty for a ratio")]
+    z: Annotated[float, Meta(description="value − initial, in σ of the file's tolerance")]
+    at_bound: Annotated[bool, Meta(description="whether the fit ended at the end of what is allowed")]
     spread: float | None = None  # 1 σ of the value before its interval was cut; half the interval's own without it
     cut: bool = False  # whether the interval ends where the parameter's physics does
-    from_file: bool = False  # whether the recordings tell nothing beyond the file's tolerance, which its interval is
+    from_file: Annotated[
+        bool, Meta(description="whether the recordings tell nothing beyond the file's tolerance, its interval's")
+    ] = False
+
+    @property
+    def told90(
+        self,
+    ) -> Annotated[
+        Interval | None, as_named("interval90", "the ends of the 90 % interval about value; null: see from_file")
+    ]:
+        """The interval, where it is the recordings'."""
+        return None if self.from_file else self.interval90
 
     @property
     def sigma(self) -> float:
@@ -303,11 +310,21 @@ class Calibrated:
 
 @dataclass(frozen=True, eq=False)
 class Calibration:
-    """The fit and what it leaves."""
+    """The fit of the actuator's parameters within their tolerances, and what it leaves."""
 
-    converged: bool
-    parameters: dict[str, Calibrated]  # "section.parameter", k1…k8
-    starts: dict[str, Calibrated]  # of the windows: "turned 0" and "play 0", rad at the motor, "faster 0", rad/s
+    converged: Annotated[bool, Meta(description="whether several starts end in the same minimum")]
+    parameters: Annotated[
+        dict[str, Calibrated],
+        Meta(description="by the names in the actuator's file, section.name, and k1 … k8", extra=NAME),
+    ]
+    starts: Annotated[  # of the windows: "turned 0" and "play 0", rad at the motor, "faster 0", rad/s
+        dict[str, Calibrated],
+        Meta(
+            description="of the recordings: turned N is the motor's offset at the start, faster N its speed's, pull N "
+            "that of the torque that its drive asked for, play N where in the backlash it was, lag N by how much later "
+            "than the positions the current was recorded"
+        ),
+    ]
     actuator: Actuator  # with the fitted values, and with k for its faults
     k: Array  # (8,)
     residual: Array  # (values,), model − measurement over the floor that weights the fit
@@ -319,8 +336,11 @@ class Calibration:
     weighted_sensitivities: list[dict[str, Array]]  # the same over the floor that weights the fit
     x: Array  # (unknowns,), the fitted values, in σ from the file's
     room: tuple[Array, Array]  # (unknowns,) each, how far x may still go down and up, in σ
-    evaluations: int
-    confounded: tuple[tuple[str, str], ...]  # pairs that trade against each other
+    evaluations: Annotated[int, Meta(description="how many times the recordings were simulated")]
+    confounded: Annotated[  # pairs that trade against each other
+        tuple[tuple[str, str], ...],
+        Meta(description="pairs of parameters that are known only together", extra=NAME),
+    ]
     identifiable: tuple[Combination, ...]  # what is known only together, of parameters that are hardly known alone
     free: tuple[str, ...]
     is_final: bool = True  # it went to its end, and its intervals are the recordings'
@@ -350,7 +370,9 @@ class Calibration:
         return np.concatenate([part[name] for part in self.weighted_sensitivities for name in part])
 
     @property
-    def outside_tolerance(self) -> tuple[str, ...]:
+    def outside_tolerance(
+        self,
+    ) -> Annotated[tuple[str, ...], Meta(description="parameters that end at the edge of their tolerance", extra=NAME)]:
         """Parameters that stand at 3 σ of their tolerance, or would go beyond."""
         return tuple(name for name, one in self.parameters.items() if abs(one.z) > _OUTSIDE_Z)
 

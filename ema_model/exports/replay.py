@@ -7,9 +7,10 @@ import time
 from collections.abc import Callable, Sequence
 from copy import copy
 from dataclasses import dataclass, field, replace
-from typing import Protocol
+from typing import Annotated, Protocol
 
 import numpy as np
+from msgspec import Meta
 from numpy.typing import NDArray
 
 from ema_model.actuator import Actuator
@@ -22,6 +23,7 @@ from ema_model.models.loop_window import COMPARED, LoopWindow
 from ema_model.models.open_loop import driven_freely
 from ema_model.physics.rows import LANES, STATE_ROWS
 from ema_model.recordings import Measurement
+from ema_model.result import NAME, NULL
 from ema_model.simulation.run import Run, simulate_monitor
 
 Array = NDArray[np.float64]
@@ -45,25 +47,35 @@ class Replay(Protocol):
 class SignalLoss:
     """One signal of an export over one recording, in the signal's unit; NaN where it was not measured."""
 
-    rmse: float  # of the export beside the recording
-    rmse_ours: float  # of the monitor model
-    difference: float  # the most that they differ by, of the most that the signal goes to
-    begins_s: float = math.nan  # of the recording, where that is more than `EXACT`
+    rmse: Annotated[
+        float, Meta(description="of the export beside the recording; null where it was not measured", extra=NULL)
+    ]
+    rmse_ours: Annotated[float, Meta(description="the same of the monitor model", extra=NULL)]
+    difference: Annotated[float, Meta(description="the most that both differ by, of the signal's greatest value")]
+    begins_s: Annotated[  # of the recording, where that is more than `EXACT`
+        float, Meta(description="s, from where on that is more than 1e-9; null: never", extra=NULL)
+    ] = math.nan
 
 
 @dataclass(frozen=True, eq=False)
 class RecordingLoss:
     """An export over one recording; arrays are (samples,)."""
 
-    name: str
-    duration_s: float  # that was replayed
-    elapsed_s: float  # that the export took
-    signals: dict[str, SignalLoss]  # by name inside
+    name: Annotated[str, Meta(description="of the recording")]
+    duration_s: Annotated[float, Meta(description="s, that were replayed")]
+    elapsed_s: Annotated[float, Meta(description="s, that the export took for it")]
+    signals: Annotated[dict[str, SignalLoss], Meta(description="by name", extra=NAME)]
     time_s: Array = field(repr=False)
     measured: dict[str, Array] = field(repr=False)  # where it was
     ours: dict[str, Array] = field(repr=False)
     shown: dict[str, Array] = field(repr=False)  # by the export
-    switch: str = ""  # at what a difference begins, in words
+    switch: Annotated[str, Meta(description="what switches where a difference begins, in words; empty: nothing")] = ""
+
+    @property
+    def without_errors(self) -> RecordingLoss:
+        """The same of a run that was made for it, which is no recording to be off from."""
+        signals = {name: replace(one, rmse=math.nan, rmse_ours=math.nan) for name, one in self.signals.items()}
+        return replace(self, signals=signals)
 
 
 @dataclass(frozen=True, eq=False)

@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Annotated, TypedDict
+from typing import Annotated
 
 import numpy as np
 from msgspec import Meta
@@ -13,17 +12,17 @@ from msgspec import Meta
 from ema_model.exports.exported import Exported
 from ema_model.exports.replay import EXACT, RecordingLoss, SignalLoss
 from ema_model.quantities.axes import Axes, of_signal
-from ema_model.quantities.numbers import plain
 from ema_model.quantities.titles import all_of
-from ema_model.text import Document, InWords, Lines, Note, Table
+from ema_model.result import FLAT, NAME, NULL, Result, as_named
+from ema_model.text import Document, Lines, Note, Table
 
 
 @dataclass(frozen=True)
 class CannotHold:
     """A part of the model that a target has no form for."""
 
-    what: str  # "load-dependent friction"
-    share: float  # of our own error, that the target's is greater by for it; NaN where that is not known
+    what: Annotated[str, Meta(description="in words")]  # "load-dependent friction"
+    share: Annotated[float, Meta(description="of our error, that the target's is greater by for it", extra=NULL)]
 
 
 @dataclass(frozen=True)
@@ -32,19 +31,23 @@ class TargetProof:
 
     target: str  # of `TARGETS`
     title: str  # "C"
-    files: tuple[str, ...]
-    checked_with: str  # "compiled by gcc"
+    files: Annotated[tuple[str, ...], Meta(description="in the folder")]
+    checked_with: Annotated[str, Meta(description="what ran it")]  # "compiled by gcc"
     recordings: tuple[RecordingLoss, ...]
-    cannot_hold: tuple[CannotHold, ...] = ()
+    cannot_hold: Annotated[tuple[CannotHold, ...], Meta(description="the loss budget, the greatest share first")] = ()
     notes: tuple[str, ...] = ()
 
     @property
-    def difference(self) -> float:
+    def difference(
+        self,
+    ) -> Annotated[float, Meta(description="the most that it differs by, of a signal's greatest value")]:
         """The most that it differs from the monitor model by, of a signal's greatest size."""
         return max(one.difference for loss in self.recordings for one in loss.signals.values())
 
     @property
-    def real_time(self) -> float:
+    def real_time(
+        self,
+    ) -> Annotated[float, Meta(description="seconds of motion in a second of computing", extra=NULL)]:
         """Seconds of motion that it takes a second for."""
         elapsed = sum(loss.elapsed_s for loss in self.recordings)
         return sum(loss.duration_s for loss in self.recordings) / elapsed if elapsed > 0.0 else math.inf
@@ -64,15 +67,72 @@ class TargetProof:
         return found
 
 
+@dataclass(frozen=True)
+class TargetInFile:
+    """One target of an export."""
+
+    proof: Annotated[TargetProof, Meta(extra=FLAT)]
+    rmse: Annotated[dict[str, float], Meta(description="over all recordings, by signal", extra=NAME)]
+    rmse_ours: Annotated[dict[str, float], Meta(description="the same of the monitor model", extra=NAME)]
+    ratio: Annotated[float | None, Meta(description="the greatest quotient of the two; null without recordings")]
+    notes: Annotated[list[str], Meta(description="in sentences")]
+    recordings: Annotated[list[RecordingLoss], Meta(description="one by one")]
+
+
 @dataclass(frozen=True, eq=False, repr=False)
-class Export(InWords):
-    """What was exported of an actuator."""
+class Export(Result):
+    """What was exported of an actuator, with its loss."""
 
     one: Exported
-    folder: str
+    folder: Annotated[str, Meta(description="as given")]
     targets: tuple[TargetProof, ...]
-    simulated: bool  # whether no recording was given, so that the proof is against the monitor model alone
+    simulated: Annotated[bool, Meta(description="true where no recording was given: proved on a run made for it")]
     names: tuple[str, ...] = field(default=())  # of the recordings
+
+    def name_in_files(self, name: str) -> str:
+        """A signal's name."""
+        return self.axes.signal(name)
+
+    @property
+    def name(self) -> Annotated[str, Meta(description="of the actuator")]:
+        """As its file says."""
+        return self.one.given.name
+
+    @property
+    def input(self) -> Annotated[str, Meta(description="what is put in: command_rad, motor_torque_Nm, duty")]:
+        """By its name in files."""
+        return self.one.command.name
+
+    @property
+    def step_s(self) -> Annotated[float, Meta(description="s, the model's step")]:
+        """Of time."""
+        return self.one.step_s
+
+    @property
+    def notes(
+        self,
+    ) -> Annotated[list[str], Meta(description="what whoever takes it must know, in sentences")]:
+        """Of the model that was written."""
+        return list(self.one.notes)
+
+    @property
+    def by_target(
+        self,
+    ) -> Annotated[dict[str, TargetInFile], as_named("export", "by target: c, fmu, mjcf, python")]:
+        """The targets; of a run that was made for it, without errors beside a recording."""
+        return {proof.target: self._in_file(proof) for proof in self.targets}
+
+    def _in_file(self, proof: TargetProof) -> TargetInFile:
+        signals = {} if self.simulated else proof.signals
+        ratios = [one.rmse / one.rmse_ours for one in signals.values() if one.rmse_ours > 0.0]
+        return TargetInFile(
+            proof,
+            rmse={name: one.rmse for name, one in signals.items()},
+            rmse_ours={name: one.rmse_ours for name, one in signals.items()},
+            ratio=max(ratios, default=None),
+            notes=[*switches(proof), *proof.notes],
+            recordings=[one.without_errors if self.simulated else one for one in proof.recordings],
+        )
 
     @property
     def axes(self) -> Axes:
@@ -154,112 +214,3 @@ def _percent(share: float) -> str:
 
 def _ratio(one: SignalLoss) -> str:
     return f"{one.rmse / one.rmse_ours:.3f}" if one.rmse_ours > 0.0 else "1" if one.rmse == 0.0 else "∞"
-
-
-# --- as JSON ----------------------------------------------------------------------------------------------------------
-
-
-class SignalLossJson(TypedDict):
-    """One signal of an export over one recording."""
-
-    rmse: Annotated[
-        float | None, Meta(description="of the export beside the recording; null where it was not measured")
-    ]
-    rmse_ours: Annotated[float | None, Meta(description="the same of the monitor model")]
-    difference: Annotated[float, Meta(description="the most that both differ by, of the signal's greatest value")]
-    begins_s: Annotated[float | None, Meta(description="s, from where on that is more than 1e-9; null: never")]
-
-
-class RecordingLossJson(TypedDict):
-    """An export over one recording."""
-
-    name: Annotated[str, Meta(description="of the recording")]
-    duration_s: Annotated[float, Meta(description="s, that were replayed")]
-    elapsed_s: Annotated[float, Meta(description="s, that the export took for it")]
-    switch: Annotated[str, Meta(description="what switches where a difference begins, in words; empty: nothing")]
-    signals: Annotated[dict[str, SignalLossJson], Meta(description="by name")]
-
-
-class CannotHoldJson(TypedDict):
-    """A part of the model that a target has no form for."""
-
-    what: Annotated[str, Meta(description="in words")]
-    share: Annotated[float | None, Meta(description="of our error, that the target's is greater by for it")]
-
-
-class TargetJson(TypedDict):
-    """One target of an export."""
-
-    files: Annotated[list[str], Meta(description="in the folder")]
-    checked_with: Annotated[str, Meta(description="what ran it")]
-    rmse: Annotated[dict[str, float], Meta(description="over all recordings, by signal")]
-    rmse_ours: Annotated[dict[str, float], Meta(description="the same of the monitor model")]
-    ratio: Annotated[float | None, Meta(description="the greatest quotient of the two; null without recordings")]
-    difference: Annotated[float, Meta(description="the most that it differs by, of a signal's greatest value")]
-    real_time: Annotated[float, Meta(description="seconds of motion in a second of computing")]
-    cannot_hold: Annotated[list[CannotHoldJson], Meta(description="the loss budget, the greatest share first")]
-    notes: Annotated[list[str], Meta(description="in sentences")]
-    recordings: Annotated[list[RecordingLossJson], Meta(description="one by one")]
-
-
-class ExportJson(TypedDict):
-    """What was exported of an actuator, with its loss."""
-
-    name: Annotated[str, Meta(description="of the actuator")]
-    folder: Annotated[str, Meta(description="as given")]
-    input: Annotated[str, Meta(description="what is put in: command_rad, motor_torque_Nm, duty")]
-    step_s: Annotated[float, Meta(description="s, the model's step")]
-    simulated: Annotated[bool, Meta(description="true where no recording was given: proved on a run made for it")]
-    notes: Annotated[list[str], Meta(description="what whoever takes it must know, in sentences")]
-    export: Annotated[dict[str, TargetJson], Meta(description="by target: c, fmu, mjcf, python")]
-
-
-def as_dict(result: Export) -> ExportJson:
-    """The fields of --json."""
-    found: ExportJson = {
-        "name": result.one.given.name,
-        "folder": result.folder,
-        "input": result.one.command.name,
-        "step_s": result.one.step_s,
-        "simulated": result.simulated,
-        "notes": list(result.one.notes),
-        "export": {proof.target: _target(proof, result) for proof in result.targets},
-    }
-    return plain(found)
-
-
-def _target(proof: TargetProof, result: Export) -> TargetJson:
-    signals = {} if result.simulated else proof.signals
-    shown = result.axes.signal
-    ratios = [one.rmse / one.rmse_ours for one in signals.values() if one.rmse_ours > 0.0]
-    return {
-        "files": list(proof.files),
-        "checked_with": proof.checked_with,
-        "rmse": {shown(name): one.rmse for name, one in signals.items()},
-        "rmse_ours": {shown(name): one.rmse_ours for name, one in signals.items()},
-        "ratio": max(ratios) if ratios else None,
-        "difference": proof.difference,
-        "real_time": proof.real_time,
-        "cannot_hold": [{"what": one.what, "share": one.share} for one in proof.cannot_hold],
-        "notes": [*switches(proof), *proof.notes],
-        "recordings": [_recording(loss, result) for loss in proof.recordings],
-    }
-
-
-def _recording(loss: RecordingLoss, result: Export) -> RecordingLossJson:
-    signals: Mapping[str, SignalLoss] = loss.signals
-    return {
-        "name": loss.name,
-        "duration_s": loss.duration_s,
-        "elapsed_s": loss.elapsed_s,
-        "switch": loss.switch,
-        "signals": {
-            result.axes.signal(name): {
-                "rmse": None if result.simulated else one.rmse,
-                "rmse_ours": None if result.simulated else one.rmse_ours,
-                "difference": one.difference,
-                "begins_s": one.begins_s,
-            }
-            for name, one in signals.items()
-        },
-    }

@@ -4,26 +4,22 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Annotated, Any, TypedDict
+from typing import Annotated
 
 from msgspec import Meta
 
 from ema_model.actuator import Actuator
-from ema_model.actuator.parameters import on_axes
-from ema_model.comparison.result import ParameterJson, parameter_dict
 from ema_model.discovery import Added, Discovery, discover
-from ema_model.discovery import as_dict as of_discovery
-from ema_model.discovery.words import DiscoveryJson, effect_title
+from ema_model.discovery.result import AddedInFile, effect_title, in_file
 from ema_model.fleet.compare import check_units, compare_units
 from ema_model.fleet.result import UnitsCompared, and_so_on, notes, rests_on
 from ema_model.fleet.result import document_of as document_of_compared
 from ema_model.fleet.result import sentences as of_differences
-from ema_model.quantities.axes import Axes
 from ema_model.quantities.numbers import number
 from ema_model.quantities.titles import in_sentence
 from ema_model.recordings import Measurement
-from ema_model.result import json_type
-from ema_model.text import Block, Document, InWords, Lines, Note, Table
+from ema_model.result import Result, as_named
+from ema_model.text import Block, Document, Lines, Note, Table
 
 # --- looks for the physics that units lack: unit by unit, and in each again for what others lack ----------------------
 # Each unit's parameters are its own in this, so that what units differ in is no effect that they lack.  An effect that
@@ -149,23 +145,56 @@ class Lack:
         return tuple(self.by_unit)
 
 
+@dataclass(frozen=True)
+class LackInFile:
+    """An effect that units lack."""
+
+    name: Annotated[str, Meta(description="as `emaviz effects` lists it")]
+    same_as: Annotated[tuple[str, ...], Meta(description="effects that no unit's recordings tell from it")]
+    all_units: Annotated[bool, Meta(description="whether all units lack it")]
+    units: Annotated[dict[str, AddedInFile], Meta(description="those that lack it, by name, as their recordings tell")]
+
+
 @dataclass(frozen=True, repr=False, eq=False)
-class UnitsDiscovered(InWords):
-    """The answer."""
+class UnitsDiscovered(Result):
+    """Which physical effects the model of a type lacks (with --by or --unit)."""
 
     units: tuple[str, ...]
     lacks: tuple[Lack, ...]  # those that all units lack first
-    discoveries: Mapping[str, Discovery]  # of each unit, the last one
-    compared: UnitsCompared  # with what all units lack in the model
+    discoveries: Annotated[Mapping[str, Discovery], Meta(description="of each unit, by its name")]  # the last one
+    compared: Annotated[UnitsCompared, Meta(description="what differs, with what all units lack in the model")]
     actuator: Actuator  # the file's, with what all units lack
     held_out: frozenset[str]  # units with recordings that were not fitted
+
+    @property
+    def answer(self) -> Annotated[list[str], as_named("sentences", "the answer in words, the first one first")]:
+        """What is lacking, and what differs beside it."""
+        return sentences(self)
+
+    @property
+    def lacking(
+        self,
+    ) -> Annotated[list[LackInFile], as_named("effects", "what is missing, that of most units first")]:
+        """What units lack, by the names in files."""
+        axes = self.actuator.axes
+        return [
+            LackInFile(
+                lack.effect,
+                lack.same_as,
+                self.is_of_all(lack),
+                {unit: in_file(one, axes) for unit, one in lack.by_unit.items()},
+            )
+            for lack in self.lacks
+        ]
 
     def is_of_all(self, one: Lack) -> bool:
         """Whether all units lack it."""
         return len(one.by_unit) == len(self.units)
 
     @property
-    def unexplained(self) -> tuple[str, ...]:
+    def unexplained(
+        self,
+    ) -> Annotated[tuple[str, ...], Meta(description="units of which something is left that no effect explains")]:
         """Units of which more than the floor is left, that no effect explains."""
         return tuple(
             name
@@ -174,7 +203,9 @@ class UnitsDiscovered(InWords):
         )
 
     @property
-    def undecided(self) -> tuple[str, ...]:
+    def undecided(
+        self,
+    ) -> Annotated[tuple[str, ...], Meta(description="units of which nothing can be said")]:
         """Units of which nothing can be said: not converged, not repeatable, or of recordings that tell nothing."""
         nothing = ("not_converged", "not_repeatable", "uninformative")
         return tuple(name for name, one in self.discoveries.items() if one.verdict in nothing)
@@ -248,83 +279,6 @@ def _table(result: UnitsDiscovered) -> Table:
     return Table(head, rows, "what is lacking", unit="error, × floor")
 
 
-# --- the JSON form of the physics that units lack: what each field means, and where it is from ------------------------
-
-
-if TYPE_CHECKING:
-    UnitsComparedJson = dict[str, Any]
-else:
-    UnitsComparedJson = json_type(UnitsCompared)  # of its fields
-
-
-class LackOfUnitJson(TypedDict):
-    """An effect as one unit's recordings tell it; errors are rms pooled over signals, in floors."""
-
-    name: Annotated[str, Meta(description="the effect, or one that these recordings do not tell from it")]
-    parameters: Annotated[dict[str, ParameterJson], Meta(description="that were fitted, by their names in files")]
-    chosen: Annotated[dict[str, float], Meta(description="that were not fitted, as a whole order")]
-    rmse_before: Annotated[float | None, Meta(description="without it")]
-    rmse_after: Annotated[float | None, Meta(description="with it")]
-    holdout_rmse_before: Annotated[float | None, Meta(description="of what was not fitted, without it; null: nothing")]
-    holdout_rmse_after: Annotated[float | None, Meta(description="of what was not fitted, with it; null: nothing")]
-
-
-class LackJson(TypedDict):
-    """An effect that units lack."""
-
-    name: Annotated[str, Meta(description="as `emaviz effects` lists it")]
-    same_as: Annotated[list[str], Meta(description="effects that no unit's recordings tell from it")]
-    all_units: Annotated[bool, Meta(description="whether all units lack it")]
-    units: Annotated[dict[str, LackOfUnitJson], Meta(description="those that lack it, by name")]
-
-
-class UnitsDiscoveredJson(TypedDict):
-    """Which physical effects the model of a type lacks (with --by or --unit)."""
-
-    sentences: Annotated[list[str], Meta(description="the answer in words, the first one first")]
-    effects: Annotated[list[LackJson], Meta(description="what is missing, that of most units first")]
-    unexplained: Annotated[list[str], Meta(description="units of which something is left that no effect explains")]
-    undecided: Annotated[list[str], Meta(description="units of which nothing can be said")]
-    discoveries: Annotated[dict[str, DiscoveryJson], Meta(description="of each unit, by its name")]
-    compared: Annotated[UnitsComparedJson, Meta(description="what differs, with what all units lack in the model")]
-
-
-def as_dict(result: UnitsDiscovered) -> UnitsDiscoveredJson:
-    """Plain values only."""
-    axes = result.actuator.axes
-    return {
-        "sentences": sentences(result),
-        "effects": [
-            {
-                "name": lack.effect,
-                "same_as": list(lack.same_as),
-                "all_units": result.is_of_all(lack),
-                "units": {unit: _added(one, axes) for unit, one in lack.by_unit.items()},
-            }
-            for lack in result.lacks
-        ],
-        "unexplained": list(result.unexplained),
-        "undecided": list(result.undecided),
-        "discoveries": {unit: of_discovery(one) for unit, one in result.discoveries.items()},
-        "compared": result.compared.to_dict(),
-    }
-
-
-def _added(one: Added, axes: Axes) -> LackOfUnitJson:
-    return {
-        "name": one.name,
-        "parameters": {
-            on_axes(f"effects.{one.key}.{name}", axes).name: parameter_dict(parameter)
-            for name, parameter in one.parameters.items()
-        },
-        "chosen": dict(one.chosen),
-        "rmse_before": one.rmse_before,
-        "rmse_after": one.rmse_after,
-        "holdout_rmse_before": one.holdout_before,
-        "holdout_rmse_after": one.holdout_after,
-    }
-
-
 # --- which physics several units of one type lack: all of them, or one alone; and what differs beside it --------------
 
-__all__ = ["Lack", "UnitsDiscovered", "as_dict", "discover_units"]
+__all__ = ["Lack", "UnitsDiscovered", "discover_units"]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import Annotated, Any
+from typing import Annotated
 
 import numpy as np
 from msgspec import Meta
@@ -16,7 +16,7 @@ from ema_model.fleet.criteria import MISFIT
 from ema_model.quantities.axes import of_signal
 from ema_model.quantities.numbers import HALF_90, amount, number, with_uncertainty
 from ema_model.quantities.titles import in_sentence
-from ema_model.result import NAME, Result
+from ema_model.result import NAME, Result, as_named
 from ema_model.text import Block, Document, Lines, Note, Table
 
 # --- what was found in comparing units --------------------------------------------------------------------------------
@@ -26,24 +26,23 @@ Array = NDArray[np.float64]
 Interval = tuple[float, float]
 
 
-def _as(name: str, description: str, **more: Any) -> Meta:
-    """What a field means that has another name in the JSON form."""
-    return Meta(description=description, extra={"as": name, **more})
-
-
 @dataclass(frozen=True)
 class Difference:
     """A parameter in which one unit is not as the others; every interval holds 90 %."""
 
     unit: Annotated[str, Meta(description="its name")]
     parameter: Annotated[str, Meta(description="section.name, as the actuator's file calls it", extra=NAME)]
-    alike: Annotated[tuple[str, ...], _as("same_as", "other parameters of the unit that would tell it as well", **NAME)]
+    alike: Annotated[
+        tuple[str, ...], as_named("same_as", "other parameters of the unit that would tell it as well", **NAME)
+    ]
     change: Annotated[float, Meta(description="from what the others share, in the unit that ends the name")]
-    change90: Annotated[Interval, _as("interval90", "the ends of the 90 % interval about change")]
+    change90: Annotated[Interval, as_named("interval90", "the ends of the 90 % interval about change")]
     share: Annotated[float | None, Meta(description="the change over what the others share; null: that is 0")]
-    share90: Annotated[Interval | None, _as("share_interval90", "the ends of the 90 % interval about share")]
+    share90: Annotated[Interval | None, as_named("share_interval90", "the ends of the 90 % interval about share")]
     evidence: Annotated[float, Meta(description="of −2 log likelihood, by which a shared value is worse")]
-    held_out: Annotated[float | None, _as("held_out_evidence", "the same on what was not fitted; null: nothing was")]
+    held_out: Annotated[
+        float | None, as_named("held_out_evidence", "the same on what was not fitted; null: nothing was")
+    ]
 
     @property
     def together(self) -> tuple[str, ...]:
@@ -71,8 +70,8 @@ class OfRecording:
     recording: Annotated[str, Meta(description="the recording's name")]
     quantity: Annotated[str, Meta(description="current_zero, current_delay or winding_temperature")]
     value: Annotated[float, Meta(description="by how much, in the unit that `in` says")]
-    value90: Annotated[Interval, _as("interval90", "the ends of the 90 % interval about value")]
-    in_unit: Annotated[str, _as("in", "the unit of measurement: A, s or K")]
+    value90: Annotated[Interval, as_named("interval90", "the ends of the 90 % interval about value")]
+    in_unit: Annotated[str, as_named("in", "the unit of measurement: A, s or K")]
     allowed_for: Annotated[
         bool, Meta(description="whether the fit allows for it; else the unit's differences are open")
     ]
@@ -96,8 +95,8 @@ class Transfer:
     """Each unit's own model on each unit's recordings; rows and columns are in the order of `units`."""
 
     signal: Annotated[str, Meta(description="that rmse and noise_floor are of, and whose unit they have", extra=NAME)]
-    error: Annotated[Array, _as("rmse", "rows: the model of, columns: the recordings of", dimensions=2)]
-    floor: Annotated[Array, _as("noise_floor", "rms that a perfect model would leave of the recordings of")]
+    error: Annotated[Array, as_named("rmse", "rows: the model of, columns: the recordings of", dimensions=2)]
+    floor: Annotated[Array, as_named("noise_floor", "rms that a perfect model would leave of the recordings of")]
     floors: Annotated[
         Array, Meta(description="the error of all signals in floors, as rmse is ordered", extra={"dimensions": 2})
     ]
@@ -146,12 +145,14 @@ class UnitsCompared(Result):
     recordings: tuple[tuple[str, ...], ...]  # names, fitted, of each unit
     held_out: tuple[tuple[str, ...], ...]
     differences: Annotated[tuple[Difference, ...], Meta(description="in which units are not as the others")]
-    dropped: Annotated[tuple[Difference, ...], _as("contradicted", "differences that held-out recordings contradict")]
+    dropped: Annotated[
+        tuple[Difference, ...], as_named("contradicted", "differences that held-out recordings contradict")
+    ]
     of_recordings: Annotated[tuple[OfRecording, ...], Meta(description="what is of one recording, and of no unit")]
-    of_type: Annotated[dict[str, OfType], _as("type", "what the units have in common, by section.name", **NAME)]
+    of_type: Annotated[dict[str, OfType], as_named("type", "what the units have in common, by section.name", **NAME)]
     alone: dict[str, Alone]  # by parameter, as `of_type`
     transfer: Annotated[Transfer, Meta(description="which model suits which unit")]
-    needs: Annotated[tuple[Need, ...], _as("needed", "what the recordings do not tell, and which would")]
+    needs: Annotated[tuple[Need, ...], as_named("needed", "what the recordings do not tell, and which would")]
     errors: Array  # (units,), of each unit's own model, in floors
     type_actuator: Actuator  # with the type's values and tolerances
     warnings: Annotated[tuple[str, ...], Meta(description="what the answer must be read with")]
@@ -162,7 +163,7 @@ class UnitsCompared(Result):
         return on_axes(name, axes).path if "." in name else axes.signal(name)
 
     @property
-    def answer(self) -> Annotated[list[str], _as("sentences", "the answer in words, the first one first")]:
+    def answer(self) -> Annotated[list[str], as_named("sentences", "the answer in words, the first one first")]:
         """What differs, and what scatters."""
         return sentences(self)
 
@@ -179,7 +180,7 @@ class UnitsCompared(Result):
         return [path for path, one in self.of_type.items() if one.scatter > 0.0]
 
     @property
-    def each(self) -> Annotated[list[Unit], _as("units", "each as its own recordings tell it")]:
+    def each(self) -> Annotated[list[Unit], as_named("units", "each as its own recordings tell it")]:
         """By unit, what stands elsewhere by what it is."""
         return [self._unit(place, name) for place, name in enumerate(self.units)]
 

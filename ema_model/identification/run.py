@@ -6,23 +6,27 @@ import time
 from collections.abc import Callable, Generator, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cache
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
+from msgspec import Meta
 from numpy.typing import ArrayLike, NDArray
 
 from ema_model import faults
 from ema_model.actuator import Actuator
+from ema_model.actuator.actuator import readings
+from ema_model.actuator.parameters import on_axes
 from ema_model.errors import InputError, quoted
+from ema_model.estimation.calibrate import KnownTogether, combinations
 from ema_model.identification.fit import FAULTS, LONGER_STEPS_S, CorrectedError, Setting, refine, refine_best, setting
 from ema_model.identification.optimisers import OPTIMISERS, Optimiser, create
 from ema_model.identification.search import Objective, search
 from ema_model.identification.uncertainty import Uncertainty, uncertainty
 from ema_model.physics.rows import LANES
 from ema_model.quantities.numbers import as_number, check_seed
+from ema_model.result import FLAT, NAME, NULL, Result
 from ema_model.simulation.compiled import compile_ahead, compile_here, stack_at_hand, wait_for
 from ema_model.stacks import Stack
-from ema_model.text import InWords
 
 Array = NDArray[np.float64]
 
@@ -43,40 +47,85 @@ def algorithm_title(name: str) -> str:
 class Progress:
     """Where an identification stands after an iteration; iteration 0 is the first random population."""
 
-    algorithm: str
-    iteration: int
-    iterations: int
-    rmse: float  # A, of the best so far, uncorrected; `robust` ranks by all signals, so that this may rise
-    k: Array  # (8,), of the best
+    algorithm: Annotated[str, Meta(description="robust, ssa, hba or do")]
+    iteration: Annotated[int, Meta(description="the last one of the search")]
+    iterations: Annotated[int, Meta(description="how many there would have been")]
+    rmse: Annotated[  # uncorrected; `robust` ranks by all signals, so that this may rise
+        float, Meta(description="A, of the current, at k and the file's other parameters")
+    ]
+    k: Annotated[Array, Meta(description="k1 … k8, 0 … 1, the best so far")]
     population: Array  # (n, 8)
     population_rmse: Array  # (n,), A
-    evaluations: int
-    elapsed_s: float
+    evaluations: Annotated[int, Meta(description="how many times the recordings were simulated")]
+    elapsed_s: Annotated[float, Meta(description="s, without compilation")]
+
+
+@dataclass(frozen=True)
+class SearchHistory:
+    """The search, iteration by iteration; the first is the first random population."""
+
+    rmse: Annotated[Array, Meta(description="A, of the best so far")]
+    k: Annotated[Array, Meta(description="(8,) each, the best so far", extra={"dimensions": 2})]
 
 
 @dataclass(frozen=True, repr=False)
-class Identification(InWords):
-    """The answer, and how it was found."""
+class Identification(Result):
+    """The faults k1 … k8 of an actuator, each 0 … 1."""
 
     actuator: Actuator  # as its file says
-    algorithm: str
+    algorithm: Annotated[str, Meta(description="robust, ssa, hba or do")]
     seed: int
-    k: Array
-    rmse: float  # A, of the Monitor Model at k, the other parameters as the actuator's file says
-    evaluations: int
-    elapsed_s: float  # without compilation
-    compile_s: float
+    k: Annotated[Array, Meta(description="k1 … k8")]
+    rmse: Annotated[float, Meta(description="A, of the current, at k and the file's other parameters")]
+    evaluations: Annotated[int, Meta(description="how many times the recordings were simulated")]
+    elapsed_s: Annotated[float, Meta(description="s, without compilation")]
+    compile_s: Annotated[float, Meta(description="s, of compilation")]
     rmse_history: Array  # (iterations + 1,), A
     k_history: Array  # (iterations + 1, 8)
     stopped: bool  # by the user, before its last iteration
-    uncertainty: Uncertainty
-    truth: Array | None = None
-    polished: bool = False  # by a least-squares fit after the search
-    searched_k: Array | None = None  # (8,), where the search alone ended
-    parameters: dict[str, float] = field(default_factory=dict)  # of the actuator, where the fit moved them beside k
-    corrected_rmse: float = float("nan")  # A, of k: by `corrected_error`
+    uncertainty: Annotated[Uncertainty, Meta(extra=FLAT)]
+    truth: Annotated[Array | None, Meta(description="k1 … k8; null: they are not known")] = None
+    polished: Annotated[bool, Meta(description="whether a least-squares fit followed the search")] = False
+    searched_k: Annotated[Array | None, Meta(description="k1 … k8, where the search alone ended")] = None
+    parameters: Annotated[
+        dict[str, float], Meta(description="section.name, where the fit moved them beside k", extra=NAME)
+    ] = field(default_factory=dict)
+    corrected_rmse: Annotated[  # by `corrected_error`
+        float, Meta(description="A, the same where a fit freed the model of its bias", extra=NULL)
+    ] = float("nan")
     corrected_history: Array = field(default_factory=lambda: np.zeros(0))  # (iterations + 1,), A, of k_history
     corrected_error: CorrectedError | None = field(default=None, compare=False)
+    objective: Objective | None = field(default=None, compare=False)  # what it was fitted to
+    held_out: tuple[str, ...] = ()  # names of recordings that were not fitted
+    holdout_rmse: Annotated[
+        float, Meta(description="A, of what was not fitted; null: nothing, or it diverges", extra=NULL)
+    ] = float("nan")
+
+    def name_in_files(self, name: str) -> str:
+        """A parameter's path on the actuator's axes."""
+        return on_axes(name, self.actuator.axes).path
+
+    @property
+    def physical(
+        self,
+    ) -> Annotated[dict[str, float], Meta(description="what k means in this actuator, units in the names")]:
+        """By name."""
+        return readings(self.k, self.actuator)
+
+    @property
+    def identifiable(
+        self,
+    ) -> Annotated[
+        list[KnownTogether],
+        Meta(description="what the recordings tell only together; of a k what it multiplies, as 1 + 2 k1 or 1 − k3"),
+    ]:
+        """With its words."""
+        return combinations(self.uncertainty.identifiable, self.actuator.axes)
+
+    @property
+    def history(self) -> Annotated[SearchHistory, Meta(description="of the search")]:
+        """As the search told it."""
+        return SearchHistory(self.rmse_history, self.k_history)
 
     @property
     def found_actuator(self) -> Actuator:
@@ -86,15 +135,51 @@ class Identification(InWords):
         return replace(fitted.with_fitted_sigmas(sigmas), faults=faults.named(self.k))
 
     @property
-    def error_percent(self) -> float | None:
-        """Err % (T 5.2, literal), where the truth is known."""
+    def error_percent(
+        self,
+    ) -> Annotated[float | None, Meta(description="Err % (T 5.2); null: the truth is not known")]:
+        """Literally, where the truth is known."""
         return None if self.truth is None else faults.error_percent(self.k, self.truth)
+
+    def beside(self, unseen: Objective | None) -> Identification:
+        """The same with its error on recordings that were not fitted."""
+        if unseen is None:
+            return self
+        names = tuple(one.name for one in unseen.measurements)
+        return replace(self, held_out=names, holdout_rmse=float(unseen(self.k)[0]))
 
     def corrected_by(self, error: CorrectedError) -> Identification:
         """The same answer with its corrected errors by that of another fit; simulates its history."""
         every, places = np.unique(np.vstack([self.k_history, self.k]), axis=0, return_inverse=True)
         *history, last = error(every)[places.ravel()]
         return replace(self, corrected_rmse=float(last), corrected_history=np.array(history), corrected_error=error)
+
+
+@dataclass(frozen=True, repr=False, eq=False)
+class IdentifiedSoFar(Result):
+    """The best of a search that was interrupted, which no fit has refined."""
+
+    actuator: Actuator
+    told: Sequence[Progress]  # an iteration or more
+    interrupted: Annotated[bool, Meta(description="true")] = True
+    k_interval90: Annotated[None, Meta(description="null: none is known yet")] = None
+
+    @property
+    def last(self) -> Annotated[Progress, Meta(extra=FLAT)]:
+        """The last iteration."""
+        return self.told[-1]
+
+    @property
+    def physical(
+        self,
+    ) -> Annotated[dict[str, float], Meta(description="what k means in this actuator, units in the names")]:
+        """By name."""
+        return readings(self.last.k, self.actuator)
+
+    @property
+    def history(self) -> Annotated[SearchHistory, Meta(description="of the search")]:
+        """As it was told."""
+        return SearchHistory(np.array([at.rmse for at in self.told]), np.array([at.k for at in self.told]))
 
 
 def by_one_error(answers: Sequence[Identification]) -> list[Identification]:
@@ -194,6 +279,7 @@ def steps(
         polished=polishes,
         searched_k=last.k,
         parameters=found.problem.parameters(found.x) if polishes else {},
+        objective=objective,
     )
     return answer.corrected_by(CorrectedError(found))
 

@@ -5,8 +5,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
+from typing import Annotated
 
 import numpy as np
+from msgspec import Meta
 from numpy.typing import NDArray
 from scipy.special import chdtri, i0e, stdtrit
 
@@ -25,6 +27,7 @@ from ema_model.quantities.axes import of_signal
 from ema_model.quantities.numbers import HALF_90
 from ema_model.quantities.titles import in_sentence
 from ema_model.recordings import SIGNALS as SIGNAL_NAMES
+from ema_model.result import as_named
 from ema_model.simulation.run import Run, simulate_monitor
 
 # --- whether the model, with the best k and all that may move, leaves no more than noise and its own floor ------------
@@ -334,14 +337,22 @@ class Uncertainty:
     k7 is an angle: its interval stands about k7 and may reach beyond 0 or 1; it is 0 … 1 where k6 may be 0.
     """
 
-    interval90: Array  # (8, 2)
-    healthy: bool  # joint test at 1 %, of a model that fits
-    alarms: tuple[str, ...]  # the k that are surely not healthy; none where the model does not fit
-    ambiguous: tuple[tuple[str, ...], ...]  # groups that these recordings cannot separate
-    hardly_known: tuple[str, ...] = ()  # k, without the angle k7, that could be nearly anything
-    adequate: bool = True  # the model with this k leaves no more than the floor
-    uninformative: bool = False  # the recordings tell nothing of any model
-    warnings: tuple[str, ...] = ()
+    interval90: Annotated[  # (8, 2)
+        Array, as_named("k_interval90", "the ends of the 90 % interval of each k", dimensions=2)
+    ]
+    healthy: Annotated[bool, Meta(description="joint test of all k at 1 %")]  # of a model that fits
+    alarms: Annotated[  # none where the model does not fit
+        tuple[str, ...], Meta(description="names of the k that are surely not healthy")
+    ]
+    ambiguous: Annotated[
+        tuple[tuple[str, ...], ...], Meta(description="groups of k that the recordings cannot separate")
+    ]
+    hardly_known: Annotated[  # without the angle k7
+        tuple[str, ...], Meta(description="k that could be nearly anything")
+    ] = ()
+    adequate: Annotated[bool, Meta(description="whether the model with this k leaves no more than the floor")] = True
+    uninformative: Annotated[bool, Meta(description="whether the recordings tell nothing, whatever the model")] = False
+    warnings: Annotated[tuple[str, ...], Meta(description="what the answer must be read with")] = ()
     separated_by: Suggestion | None = None  # the run that would tell the groups apart, and the hardly known
     identifiable: tuple[Combination, ...] = ()  # what is known only together, of k's factors and the parameters
     covariance: Array = field(default_factory=lambda: np.zeros((FAULTS, FAULTS)))  # of k
@@ -352,6 +363,13 @@ class Uncertainty:
     common: Array = field(default_factory=lambda: np.zeros((FAULTS, 0)))
     own: Array = field(default_factory=lambda: np.zeros((FAULTS, FAULTS)))
     sigmas: dict[str, float] = field(default_factory=dict)  # of the parameters beside k, by path; none at a bound
+
+    @property
+    def to_run(
+        self,
+    ) -> Annotated[str, as_named("separated_by", "the run that would tell them, as options of `emaviz simulate`")]:
+        """Of `separated_by`; empty without one."""
+        return "" if self.separated_by is None else self.separated_by.options
 
 
 def uncertainty(found: Fitted, k: Array) -> Uncertainty:

@@ -5,10 +5,9 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Annotated, Any, TypeVar, cast
+from typing import Any, TypeVar, cast
 
 import numpy as np
-from msgspec import Meta
 from numpy.typing import ArrayLike
 
 from ema_model.errors import InputError, quoted
@@ -17,7 +16,6 @@ from ema_model.quantities.si import BY_SHOWN
 # --- intervals as they are told: each holds 90 % ----------------------------------------------------------------------
 
 HALF_90 = 1.645  # σ of a normal distribution, on either side
-IntervalJson = Annotated[list[float], Meta(min_length=2, max_length=2)]  # its lower and its upper end
 
 
 # --- round numbers in a range, for axes -------------------------------------------------------------------------------

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import asdict, dataclass, field, replace
-from typing import Annotated, Literal, TypedDict
+from dataclasses import dataclass, field, replace
+from typing import Annotated, Literal
 
 import numpy as np
 from msgspec import Meta
@@ -19,7 +19,8 @@ from ema_model.recordings import noise as estimates
 from ema_model.recordings.column_mapping import MappedColumn
 from ema_model.recordings.measurement import PHASES, Measurement
 from ema_model.recordings.noise import clock_drift, speed_lag
-from ema_model.text import Document, InWords, Lines
+from ema_model.result import NULL, Result
+from ema_model.text import Document, Lines
 
 # --- one line of the data health card ---------------------------------------------------------------------------------
 
@@ -29,13 +30,15 @@ MARKS: dict[Severity, str] = {"warning": "▲", "note": "●", "good": "✓"}  #
 
 @dataclass(frozen=True)
 class Finding:
-    """What one check found: a plain sentence with its number and unit, and the numbers, units in their names."""
+    """What one check of a recording found."""
 
-    check: str
-    severity: Severity
-    sentence: str
-    values: dict[str, float] = field(default_factory=dict)
-    signal: str | None = None
+    check: Annotated[str, Meta(description="which one: sampling, noise, delay, …")]
+    severity: Annotated[Severity, Meta(description="how much it matters")]
+    sentence: Annotated[str, Meta(description="the finding in words, with its number and unit")]
+    values: Annotated[
+        dict[str, float], Meta(description="its numbers, units in the names; null: not known", extra=NULL)
+    ] = field(default_factory=dict)
+    signal: Annotated[str | None, Meta(description="of which signal; null: of the recording")] = None
 
 
 # --- the checks of the data health card; each yields findings, or nothing where its signals are missing ---------------
@@ -366,33 +369,17 @@ def _ms(seconds: float) -> str:
 __all__ = ["Finding", "Health", "health", "health_of"]
 
 
-class FindingJson(TypedDict):
-    """What one check of a recording found."""
-
-    check: Annotated[str, Meta(description="which one: sampling, noise, delay, …")]
-    severity: Annotated[Severity, Meta(description="how much it matters")]
-    sentence: Annotated[str, Meta(description="the finding in words, with its number and unit")]
-    values: Annotated[dict[str, float | None], Meta(description="its numbers, units in the names; null: not known")]
-    signal: Annotated[str | None, Meta(description="of which signal; null: of the recording")]
-
-
-class HealthJson(TypedDict):
+@dataclass(frozen=True, repr=False)
+class Health(Result):
     """The data health card of a recording."""
 
     name: Annotated[str, Meta(description="the recording's")]
-    severity: Annotated[Severity, Meta(description="the worst of all findings")]
-    findings: Annotated[list[FindingJson], Meta(description="in the order of the checks")]
-
-
-@dataclass(frozen=True, repr=False)
-class Health(InWords):
-    """All findings, in the order of the checks."""
-
-    name: str
-    findings: tuple[Finding, ...] = field(default_factory=tuple)
+    findings: Annotated[tuple[Finding, ...], Meta(description="in the order of the checks")] = field(
+        default_factory=tuple
+    )
 
     @property
-    def severity(self) -> Severity:
+    def severity(self) -> Annotated[Severity, Meta(description="the worst of all findings")]:
         """The worst of all findings."""
         worst = self.worst_first
         return worst[0].severity if worst else "good"
@@ -407,15 +394,6 @@ class Health(InWords):
         """The first finding of a check, such as "noise", of one signal where given."""
         fits = (f for f in self.findings if f.check == check and signal in (None, f.signal))
         return next(fits, None)
-
-    def as_dict(self) -> HealthJson:
-        """For JSON: numbers that are not known are null."""
-        findings = []
-        for finding in self.findings:
-            entry = FindingJson(**asdict(finding))
-            entry["values"] = {k: v if np.isfinite(v) else None for k, v in finding.values.items()}
-            findings.append(entry)
-        return {"name": self.name, "severity": self.severity, "findings": findings}
 
 
 def health_of(measurement: Measurement, actuator: Actuator) -> Health:

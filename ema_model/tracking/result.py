@@ -85,7 +85,7 @@ class Tracked(Result):
     @property
     def answer(self) -> Annotated[str, Meta(description="in one sentence")]:
         """The first line of what it says."""
-        return self.sentences[0]
+        return self.lines[0]
 
     @property
     def names(

@@ -3,18 +3,16 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from copy import copy
 from dataclasses import replace
 from fnmatch import fnmatchcase
 from pathlib import Path
-from typing import Any
 
 from ema_model.actuator import Actuator
 from ema_model.errors import InputError, did_you_mean, quoted
 from ema_model.files.opened import FILE_BYTES, listed
 from ema_model.fleet.folders import check_same_type
-from ema_model.quantities.numbers import plain
 from ema_model.recordings import Measurement, read_header
 from ema_model.recordings.recording_set import RUN, held_out, is_pattern
 from emaviz.cli import flow, option_values, output
@@ -44,7 +42,7 @@ def run(arguments: argparse.Namespace, actuator: Actuator) -> int:
 
 def run_discovery(arguments: argparse.Namespace, actuator: Actuator, signals: tuple[str, ...] | None) -> int:
     """Looks for what the units lack."""
-    from ema_model.fleet.discovery import as_dict, discover_units
+    from ema_model.fleet.discovery import discover_units
 
     _refuse(arguments, ["record"])
 
@@ -59,12 +57,7 @@ def run_discovery(arguments: argparse.Namespace, actuator: Actuator, signals: tu
             on_progress=progress.show,
         )
 
-        def report(path: str, _: Mapping[str, Any]) -> None:
-            from emaviz.views.export import export
-
-            export(result, path)
-
-        return flow.Answer(result, plain(as_dict(result)), result.compared.type_actuator, report=report)
+        return flow.of_result(result, result.compared.type_actuator)
 
     return flow.run(arguments, actuator, compute, read_units)
 

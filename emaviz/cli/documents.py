@@ -154,6 +154,20 @@ class InterruptedTrackJson(TypedDict):
     flights_named: NotRequired[Annotated[int, Meta(description="how many there are")]]
 
 
+class SavedActuatorJson(TypedDict):
+    """The improved model, written as an actuator file and simulated again from there."""
+
+    file: Annotated[str, Meta(description="as given with --save-actuator")]
+    verified_rmse: Annotated[float | None, Meta(description="of the saved model, pooled over signals, in floors")]
+    verified_holdout_rmse: Annotated[float | None, Meta(description="the same of what was not fitted; null: nothing")]
+
+
+class SavedModelJson(TypedDict):
+    """What is besides in the answer of `discover`."""
+
+    saved_actuator: NotRequired[Annotated[SavedActuatorJson, Meta(description="with --save-actuator")]]
+
+
 class CampaignJson(TypedDict):
     """How far a campaign is; of a run, `status` and `report`."""
 

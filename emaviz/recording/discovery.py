@@ -12,7 +12,7 @@ import rerun as rr
 import rerun.blueprint as rrb
 from numpy.typing import ArrayLike, NDArray
 
-from ema_model.discovery import Discovery, as_dict
+from ema_model.discovery import Discovery
 from ema_model.discovery.words import (
     PAUSE_S,
     Track,
@@ -120,7 +120,7 @@ def write_discovery(found: Discovery, path: str | Path, configuration: Mapping[s
     try:
         with DiscoveryWriter(path, found, names[:1]) as writer:
             writer.config(_configuration(found, runs, times, shifts, configuration or {}))
-            writer.properties({"discovery": as_dict(found), "shift_s": shifts})
+            writer.properties({"discovery": found.to_dict(), "shift_s": shifts})
             writer.document("verdict", written("The verdict", _in_words(found)))
             writer.ladder()
             writer.candidates()

@@ -22,6 +22,7 @@ from ema_model.campaign.thesis import (
     Evaluation,
     case_of,
 )
+from ema_model.campaign.thesis_words import NAMES, answer, coefficient_table, row_table
 from ema_model.errors import InputError
 from emaviz import colours
 from emaviz.recording import blueprint, style
@@ -30,7 +31,6 @@ from emaviz.recording.blueprint import Array, Chart, plot
 from emaviz.recording.entry import RecordingError
 from emaviz.recording.style import algorithm_colour, signal_title
 from emaviz.recording.writer import RecordingWriter, escaped
-from emaviz.text.reproduce import NAMES, answer, coefficient_table, row_table
 
 ROOT = "/reproduce"
 _PERCENTILES = (("p05", 5.0, 0.5), ("median", 50.0, 1.5), ("p95", 95.0, 0.5))  # with their lines' widths
@@ -43,7 +43,7 @@ def write_reproduction(evaluation: Evaluation, drawn: Drawn, path: str | Path) -
     """Writes a whole .rrd file; InputError in one line where that cannot be done."""
     try:
         with ReproductionWriter(path) as writer:
-            writer.properties({"reproduce": evaluation.as_dict()})
+            writer.properties({"reproduce": evaluation.to_dict()})
             writer.tables(evaluation)
             for case in CASES:
                 writer.convergence(evaluation, case.name)

@@ -533,6 +533,13 @@ class RecordingWriter:
             self._contents.answer = True
             self._text(style.ANSWER, markdown)
 
+    def finding(self, name: str, markdown: str) -> None:
+        """What a comparison found, in words: a document at /comparison/NAME, shown where it fails."""
+        with self._file.lock:
+            if style.plain(name) not in self._contents.findings:
+                self._contents.findings.append(name)
+            self._text(f"{style.COMPARISON}/{name}", markdown)
+
     def interval(self, algorithm: str, index: int, ends: ArrayLike) -> None:
         """The interval (8, 2) of each k at the last iteration."""
         ends = np.asarray(ends, dtype=float)

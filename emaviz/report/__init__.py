@@ -1,13 +1,1 @@
 """Reports: what was found, as one HTML file that needs nothing beside it."""
-
-from emaviz.report.comparison import write_report
-from emaviz.report.discovery import write_discovery_report
-from emaviz.report.export import write_export_report
-from emaviz.report.identification import write_identification_report
-
-__all__ = [
-    "write_discovery_report",
-    "write_export_report",
-    "write_identification_report",
-    "write_report",
-]

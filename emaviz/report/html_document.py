@@ -17,7 +17,7 @@ import plotly.graph_objects as go
 from plotly.offline import get_plotlyjs
 
 from ema_model.files.written import write_text
-from ema_model.text import Block, InWords, Lines, Note, Table
+from ema_model.text import Block, Lines, Note, Table
 from emaviz import __version__
 from emaviz.figures.theme import DARK, LIGHT
 
@@ -41,6 +41,15 @@ def bullets(texts: Iterable[object], kind: str = "") -> str:
     return f"<ul{_class(kind)}>{items}</ul>" if items else ""
 
 
+def marked(texts: Iterable[object], marks: Iterable[tuple[str, str]]) -> str:
+    """A list of plain texts, each behind a mark: its name, and the sign."""
+    items = (
+        f'<li><span class="{name}" title="{name}">{sign}</span>{escape(text)}</li>'
+        for text, (name, sign) in zip(texts, marks)
+    )
+    return f'<ul class="findings">{"".join(items)}</ul>'
+
+
 def table(heads: Sequence[str], rows: Iterable[Sequence[object]], *, text_columns: int = 1, marked: str = "") -> str:
     """A table of plain texts; the first `text_columns` are set left, the others, numbers, right.
 
@@ -61,13 +70,6 @@ def table(heads: Sequence[str], rows: Iterable[Sequence[object]], *, text_column
     return f'<div class="wide{many}"><table><thead><tr>{head}</tr></thead><tbody>{body}</tbody></table></div>'
 
 
-def document_table(told: Table | None, title: str) -> str:
-    """A table of a result's document, with what stands beside its rows as a last column; nothing for none."""
-    if told is None:
-        return ""
-    return folded(f"{title} {told.unit}".rstrip(), with_remarks(told))
-
-
 def with_remarks(told: Table) -> str:
     """A table of a result's document; what stands beside its rows is a last column."""
     remarks = told.remarks or [""] * len(told.rows)
@@ -78,12 +80,6 @@ def with_remarks(told: Table) -> str:
         for row, remark, marked in zip(told.rows, remarks, strong)
     ]
     return table([told.title, *told.head, *([""] if beside else [])], rows, marked=_STRONG)
-
-
-def blocks(parts: Sequence[Table | Lines], note: str) -> str:
-    """Tables and lines of a result's document, one after another, and what is to be known of them; nothing for none."""
-    shown = [with_remarks(one) if isinstance(one, Table) else bullets(one.lines) for one in parts]
-    return "".join([*shown, paragraph(note, "small")]) if shown else ""
 
 
 def link(anchor: str, text: object) -> str:
@@ -209,15 +205,3 @@ def _block(block: Block) -> str:
     if isinstance(block, Note):
         return bullets([block.line], "warning")
     return with_remarks(block) if isinstance(block, Table) else ""
-
-
-class WordsSection(Section[Subject]):
-    """The document of a result, block by block; a report's own file gives it to it."""
-
-    title = "The answer"
-    anchor = "answer"
-
-    def body(self, subject: Subject, figures: Figures) -> str:
-        """Always there."""
-        assert isinstance(subject, InWords)
-        return in_words(subject.document.blocks)

@@ -22,13 +22,13 @@ from ema_model.campaign.thesis import (
     Point,
     case_of,
 )
+from ema_model.campaign.thesis_words import NAMES, NONE, answer, coefficient_table, number, row_table, short_table
 from ema_model.quantities.axes import of_signal
 from ema_model.quantities.titles import in_sentence
 from emaviz.figures import campaign, comparison
 from emaviz.figures.campaign import SearchEffort
 from emaviz.report.campaign import Effort, Errors, Progress, Rows
 from emaviz.report.html_document import Figures, Section, folded, page, pair, paragraph, table, write
-from emaviz.text.reproduce import NAMES, NONE, answer, coefficient_table, number, row_table, short_table
 
 
 @dataclass

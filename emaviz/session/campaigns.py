@@ -277,15 +277,15 @@ def _identified(task: Task, it: TaskInputs, path: Path, tell: Tell) -> None:
 
 
 def _compared(task: Task, it: TaskInputs, path: Path, tell: Tell) -> None:
-    from emaviz.recording.comparison import write_comparison
+    from emaviz.views.export import export
 
     own = msgspec.convert(task.settings, KINDS["compare"].settings)
     found = compare(it.fitted, it.actuator, calibrate=own.calibrate, holdout=it.held, on_progress=tell)
-    write_comparison(found, path, _configuration(task))
+    export(found, path, _configuration(task))
 
 
 def _discovered(task: Task, it: TaskInputs, path: Path, tell: Tell) -> None:
-    from emaviz.recording.discovery import write_discovery
+    from emaviz.views.export import export
 
     own = msgspec.convert(task.settings, KINDS["discover"].settings)
     signals = ["current_A"] if own.signals == "current" else None
@@ -297,7 +297,7 @@ def _discovered(task: Task, it: TaskInputs, path: Path, tell: Tell) -> None:
         most_effects=own.most_effects,
         on_progress=tell,
     )
-    write_discovery(found, path, _configuration(task))
+    export(found, path, _configuration(task))
 
 
 _RECORDED = {"identify": _identified, "compare": _compared, "discover": _discovered}

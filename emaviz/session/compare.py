@@ -215,24 +215,6 @@ def _same_command(one: Measurement, other: Measurement) -> bool:
     return bool(np.max(np.abs(own - its)) <= _ALIKE * np.ptp(own))
 
 
-# --- what stays of a comparison in the data folder: the report, and the recording for Rerun ---------------------------
-
-
-def keep(comparison: Comparison, folder: DataFolder, suffix: str) -> Path:
-    """Writes a report (.html) or a recording (.rrd) under a new name; returns where it is."""
-    path = folder.fresh(folder.recordings, "compare", suffix)
-    # Imported when wanted: rerun and the report's figures take half a second of the app's start.
-    if suffix == ".html":
-        from emaviz.report import write_report
-
-        write_report(comparison, path)
-    else:
-        from emaviz.recording.comparison import write_comparison
-
-        write_comparison(comparison, path)
-    return path
-
-
 # --- the session's part of Compare: files in, their mapping, and comparisons on the compute thread --------------------
 
 MOST_RECORDINGS = 20
@@ -574,13 +556,16 @@ class Comparing:
 
     def save(self, suffix: str) -> None:
         """Writes the last comparison as a report (.html) or for Rerun (.rrd) into the data folder, soon."""
-        self._files.post(SAVE, suffix, lambda: self._keep(suffix))
+        self._files.post(SAVE, suffix, lambda: self._save(suffix))
 
-    def _keep(self, suffix: str) -> None:
-        comparison = self.comparison
-        if comparison is None:
+    def _save(self, suffix: str) -> None:
+        if self.comparison is None:
             raise InputError("nothing is compared yet; press Compare first")
-        self.events.kept(keep(comparison, self.folder, suffix))
+        from emaviz.views.export import export  # rerun and the report's figures take half a second of the app's start
+
+        path = self.folder.fresh(self.folder.recordings, "compare", suffix)
+        export(self.comparison, path)
+        self.events.kept(path)
 
 
 def _freed(actuator: Actuator) -> set[str]:

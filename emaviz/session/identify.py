@@ -397,11 +397,10 @@ class Identifying:
                 raise InputError("the recording of this identification could not be written")
             return race.path
         from emaviz.recording.entry import free_name
-        from emaviz.report import write_identification_report  # plotly takes a second to import
+        from emaviz.views.export import export  # plotly takes a second to import
 
         path = free_name(self._folder, f"{datetime.now():%Y%m%d-%H%M%S}-identify", ".html")
-        configuration = readable(race.settings)
-        write_identification_report(race.best.answer, race.objective, path, configuration=configuration)
+        export(race.best.answer, path, readable(race.settings))
         return path
 
     def _story(self, race: Race, measurement: Measurement) -> IdentificationStory | None:

@@ -1,27 +1,118 @@
 """How results are shown: a file for each states its `VIEW`, its sections in reading order.
 
 Report, page, recording and notebook read the same list.  A section is a title and its parts: what the result says in
-words, and figures.  What a result has nothing for is left out everywhere.
+words, and figures.  Where that depends on what was found, a function of the result tells what the section holds, piece
+by piece.  What a result has nothing for is left out everywhere.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Generic, TypeVar
+from typing import TYPE_CHECKING, Any, Generic, Literal, TypeVar
 
 from numpy.typing import ArrayLike
 
 from ema_model.errors import InputError
 from ema_model.members import members
 from ema_model.text import Block, InWords
+from emaviz.text.html import Html
 from emaviz.text.results import Meaning
 
 if TYPE_CHECKING:
     import plotly.graph_objects as go
 
 R = TypeVar("R", bound=InWords)
+
+# --- the pieces that a section holds ----------------------------------------------------------------------------------
+
+Tone = Literal["", "answer", "small", "dim", "bad", "warning"]  # how a text stands out, or steps back
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """The result in two words."""
+
+    text: str
+    meaning: Meaning
+
+
+@dataclass(frozen=True)
+class Line:
+    """A paragraph."""
+
+    text: str
+    tone: Tone = ""
+
+
+@dataclass(frozen=True)
+class Bullets:
+    """A line for each, in a list; marks: the name and the sign of that which stands before each."""
+
+    lines: Sequence[str]
+    tone: Tone = ""
+    marks: Sequence[tuple[str, str]] = ()
+
+
+@dataclass(frozen=True)
+class Links:
+    """Where else in the same view something is seen: titles by anchor."""
+
+    lead: str
+    to: Mapping[str, str]
+
+
+@dataclass(frozen=True)
+class Columns:
+    """A table that has several columns of text; others are a `Table` of the result's document."""
+
+    head: Sequence[str]
+    rows: Sequence[Sequence[object]]
+    text_columns: int = 2
+    marked: str = ""  # the sign before a cell that is set strongly
+
+
+@dataclass(frozen=True)
+class Markup:
+    """What is neither words nor a figure: an equation, a drawing."""
+
+    html: Html
+
+
+@dataclass(frozen=True)
+class Row:
+    """Figures side by side where there is room; anchors: what links to them name."""
+
+    figures: Sequence[go.Figure]
+    height_px: int = 320
+    anchors: Sequence[str] = ()
+
+
+@dataclass(frozen=True)
+class Group:
+    """Pieces below a heading of their own; folded: seen after a click, framed: as a card."""
+
+    title: str
+    pieces: Sequence[Piece]
+    anchor: str = ""
+    folded: bool = False
+    framed: bool = False
+
+
+Piece = Block | Verdict | Line | Bullets | Links | Columns | Markup | Row | Group
+
+
+def figures_of(pieces: Iterable[Piece]) -> Iterator[go.Figure]:
+    """Those in them, in reading order."""
+    for one in pieces:
+        if isinstance(one, Row):
+            yield from one.figures
+        elif isinstance(one, Group):
+            yield from figures_of(one.pieces)
+
+
+# --- sections and views -----------------------------------------------------------------------------------------------
 
 
 def _everything(result: InWords) -> Sequence[Block]:
@@ -53,7 +144,18 @@ class Section(Generic[R]):
 
     title: str
     anchor: str
-    parts: tuple[Words[R] | Figures[R], ...]
+    parts: tuple[Words[R] | Figures[R], ...] = ()
+    of: Callable[[R], Iterable[Piece]] | None = None  # in the place of parts
+
+    def pieces(self, result: R) -> Iterator[Piece]:
+        """All that it holds; none leaves the section out."""
+        if self.of is not None:
+            yield from self.of(result)
+        for part in self.parts:
+            if isinstance(part, Words):
+                yield from part.of(result)
+            else:
+                yield from (Row(row, part.height(result)) for row in part.of(result))
 
 
 ANSWER: Section[Any] = Section("The answer", "answer", (Words(),))
@@ -71,17 +173,11 @@ class View(Generic[R]):
     meaning: Callable[[R], Meaning]  # which colours the headline
     columns: Callable[[R], Mapping[str, ArrayLike]] | None = None  # of a table (.csv), units in the names
     record: Callable[[R, Path, Mapping[str, Any]], None] | None = None  # writes .rrd on a timeline of its own
+    made: Callable[[R, Mapping[str, Any]], Iterable[Piece]] | None = None  # how, by which options: ends a report
 
     def figures(self, result: R) -> list[go.Figure]:
         """All of them, in reading order."""
-        return [
-            one
-            for section in self.sections
-            for part in section.parts
-            if isinstance(part, Figures)
-            for row in part.of(result)
-            for one in row
-        ]
+        return [one for section in self.sections for one in figures_of(section.pieces(result))]
 
 
 def view_of(result: R) -> View[R]:

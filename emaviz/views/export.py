@@ -8,7 +8,7 @@ from __future__ import annotations
 import csv
 import io
 import sys
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -20,7 +20,7 @@ from ema_model.files.written import write_text
 from ema_model.result import Result, shown_by
 from ema_model.text import InWords
 from emaviz.report import html_document as document
-from emaviz.views import Figures, Section, View, view_of
+from emaviz.views import Bullets, Columns, Group, Line, Links, Markup, Piece, Row, Section, Verdict, View, view_of
 
 SUFFIXES = (".html", ".rrd", ".csv")
 
@@ -49,28 +49,61 @@ def export(result: InWords, path: str | Path, configuration: Mapping[str, Any] |
     elif path.suffix == ".csv":
         _write_table(view, result, path)
     else:
-        sections = [_Written(one) for one in view.sections]
-        document.write(path, document.page(view.title(result), view.lead(result), sections, result))
+        sections = [*view.sections]
+        if view.made is not None:
+            made = view.made
+            sections.append(Section("How it was made", "made", of=lambda result: made(result, configuration or {})))
+        written = [_Written(one) for one in sections]
+        document.write(path, document.page(view.title(result), view.lead(result), written, result))
+
+
+# --- a section as HTML ------------------------------------------------------------------------------------------------
 
 
 class _Written(document.Section[Any]):
     """A section of a view as a section of a report."""
 
     def __init__(self, section: Section[Any]) -> None:
-        self.title, self.anchor, self._parts = section.title, section.anchor, section.parts
+        self.title, self.anchor, self._section = section.title, section.anchor, section
 
     def body(self, subject: Any, figures: document.Figures) -> str:
         """ "" where a result has nothing for any of its parts."""
-        return "".join(self._written(subject, figures))
+        return markup(self._section.pieces(subject), figures)
 
-    def _written(self, subject: Any, figures: document.Figures) -> Iterator[str]:
-        for part in self._parts:
-            if not isinstance(part, Figures):
-                yield document.in_words(part.of(subject))
-                continue
-            for row in part.of(subject):
-                placed = [figures.place(one, part.height(subject)) for one in row]
-                yield document.pair(*placed) if len(placed) > 1 else "".join(placed)
+
+def markup(pieces: Iterable[Piece], figures: document.Figures) -> str:
+    """Pieces of a section as HTML, their figures placed."""
+    return "".join(_piece(one, figures) for one in pieces)
+
+
+def _piece(one: Piece, figures: document.Figures) -> str:
+    if isinstance(one, Row):
+        anchors = [*one.anchors, *[""] * len(one.figures)]
+        placed = [figures.place(each, one.height_px, anchor) for each, anchor in zip(one.figures, anchors)]
+        return document.pair(*placed) if len(placed) > 1 else "".join(placed)
+    if isinstance(one, Group):
+        body, title = markup(one.pieces, figures), document.escape(one.title)
+        if one.folded:
+            return document.folded(one.title, body)
+        anchor = f' id="{document.escape(one.anchor)}"' if one.anchor else ""
+        if one.framed:
+            return f'<div class="region"{anchor}><h3>{title}</h3>{body}</div>'
+        return f"<h3{anchor}>{title}</h3>{body}"
+    if isinstance(one, Line):
+        return document.paragraph(one.text, one.tone)
+    if isinstance(one, Verdict):
+        return f'<p><span class="verdict {one.meaning}">{document.escape(one.text)}</span></p>'
+    if isinstance(one, Bullets):
+        return document.marked(one.lines, one.marks) if one.marks else document.bullets(one.lines, one.tone)
+    if isinstance(one, Links):
+        links = " · ".join(document.link(anchor, text) for anchor, text in one.to.items())
+        return f'<p class="small">{document.escape(one.lead)}: {links}</p>'
+    if isinstance(one, Columns):
+        return document.table(one.head, one.rows, text_columns=one.text_columns, marked=one.marked)
+    return one.html if isinstance(one, Markup) else document.in_words([one])
+
+
+# --- a result as a table ----------------------------------------------------------------------------------------------
 
 
 def _write_table(view: View[Any], result: InWords, path: Path) -> None:

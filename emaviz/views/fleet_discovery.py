@@ -2,27 +2,22 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from collections.abc import Iterable
 from typing import Any
 
 from ema_model.fleet.discovery import UnitsDiscovered, headline
 from emaviz.text.results import Meaning
-from emaviz.views import Figures, Section, View
+from emaviz.views import ANSWER, Piece, Section, View
 from emaviz.views.fleet import SECTIONS
 
 
-def _of_compared(part: Any) -> Any:
-    """A comparison's figures, of the comparison that is in a discovery."""
-    if not isinstance(part, Figures):
-        return part
+def _of_compared(one: Section[Any]) -> Section[UnitsDiscovered]:
+    """A comparison's section, of the comparison that is in a discovery."""
 
-    def drawn(result: Any) -> Any:
-        return part.of(result.compared)
+    def pieces(result: UnitsDiscovered) -> Iterable[Piece]:
+        return one.pieces(result.compared)
 
-    def height_px(result: Any) -> int:
-        return part.height(result.compared)
-
-    return Figures(drawn, height_px)
+    return Section(one.title, one.anchor, of=pieces)
 
 
 def _lead(result: UnitsDiscovered) -> str:
@@ -33,8 +28,11 @@ def _meaning(result: UnitsDiscovered) -> Meaning:
     return "found" if result.lacks else "good"
 
 
-_SECTIONS: tuple[Section[Any], ...] = tuple(replace(one, parts=tuple(map(_of_compared, one.parts))) for one in SECTIONS)
-
 VIEW = View(
-    of=UnitsDiscovered, name="units_discovery", title=headline, lead=_lead, sections=_SECTIONS, meaning=_meaning
+    of=UnitsDiscovered,
+    name="units_discovery",
+    title=headline,
+    lead=_lead,
+    sections=(ANSWER, *(_of_compared(one) for one in SECTIONS if one != ANSWER)),
+    meaning=_meaning,
 )

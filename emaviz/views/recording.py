@@ -17,7 +17,7 @@ from emaviz.recording import blueprint
 from emaviz.recording.entry import RecordingError
 from emaviz.recording.style import ANSWER
 from emaviz.recording.writer import RecordingWriter, written
-from emaviz.views import Figures, View
+from emaviz.views import View, figures_of
 
 _AIR = 0.05  # of the range, above and below what is drawn
 _LEAST_POINTS = 2  # of a line
@@ -55,8 +55,7 @@ class ViewWriter(RecordingWriter):
     def draw(self) -> None:
         """All figures that have lines, section by section."""
         for section in self._view.sections:
-            rows = [row for part in section.parts if isinstance(part, Figures) for row in part.of(self._result)]
-            for number, figure in enumerate((one for row in rows for one in row), 1):
+            for number, figure in enumerate(figures_of(section.pieces(self._result)), 1):
                 root = f"/{self._view.name}/{section.anchor.replace('-', '_')}/figure_{number}"
                 if self._drawn(figure, root):
                     shown = blueprint.view(_text(figure.layout.title.text), [f"{root}/**"])  # type: ignore[union-attr]

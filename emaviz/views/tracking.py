@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 import plotly.graph_objects as go
@@ -11,7 +13,6 @@ from numpy.typing import ArrayLike
 from ema_model.tracking.result import Tracked
 from ema_model.tracking.words import headline
 from emaviz.figures import tracking
-from emaviz.recording.tracking import write_tracking
 from emaviz.text.results import Meaning
 from emaviz.views import ANSWER, Figures, Section, View
 
@@ -48,6 +49,13 @@ def _columns(result: Tracked) -> Mapping[str, ArrayLike]:
     return found
 
 
+def _record(result: Tracked, path: Path, configuration: Mapping[str, Any]) -> None:
+    """On the timeline of the flights."""
+    from emaviz.recording.tracking import write_tracking  # rerun takes a second to import
+
+    write_tracking(result, path, configuration)
+
+
 VIEW = View(
     of=Tracked,
     name="track",
@@ -60,5 +68,5 @@ VIEW = View(
     ),
     meaning=_meaning,
     columns=_columns,
-    record=write_tracking,
+    record=_record,
 )

@@ -12,10 +12,11 @@ from support.discovered import with_cogging
 
 from emaviz.page.compare.result import headline
 from emaviz.page.discover.result import answer
-from emaviz.report.comparison import Answer
-from emaviz.report.discovery import Verdict
 from emaviz.report.html_document import Figures
 from emaviz.text.results import MEANINGS, of_discovery, of_units
+from emaviz.views import discovery
+from emaviz.views.comparison import VIEW
+from emaviz.views.export import markup
 
 GREEN = MEANINGS["good"]
 
@@ -36,7 +37,7 @@ def test_a_comparison_is_green_where_the_model_is_adequate_and_within_its_band(a
     }
     compared = replace(compared, adequate=adequate, over_floor=error, signals=signals)
     assert (GREEN in headline(compared)) == (meaning == "good") and MEANINGS[meaning] in headline(compared)
-    assert f'class="verdict {meaning}"' in Answer().body(compared, Figures())
+    assert f'class="verdict {meaning}"' in markup(VIEW.sections[0].pieces(compared), Figures())
 
 
 def test_units_are_green_where_their_models_miss_nothing():
@@ -60,10 +61,8 @@ def test_a_discovery_is_green_where_nothing_is_missing():
     }
     for meaning, answers in meanings.items():
         assert [of_discovery(one) for one in answers] == [meaning] * len(answers)
-    told: Any
     for one in (replace(found, verdict="effects_found"), nothing):
         meaning = of_discovery(one)
         assert MEANINGS[meaning] in answer(look(one)) and (GREEN in answer(look(one))) == (one is nothing)
-        told = SimpleNamespace(found=one)
-        assert f'class="verdict {meaning}"' in Verdict().body(told, Figures())
+        assert f'class="verdict {meaning}"' in markup(discovery.VIEW.sections[0].pieces(one), Figures())
     assert GREEN not in answer(look(nothing, assessed=False)), "it is not yet known"

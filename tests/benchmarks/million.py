@@ -19,7 +19,7 @@ from ema_model.recordings import Measurement, write_measurement
 from ema_model.recordings import read as read_recording
 from ema_model.recordings.measurement import Sensors
 from ema_model.simulation.run import Run, simulate_reference
-from emaviz.report import write_report
+from emaviz.views.export import export
 
 KEPT = ("time_s", "command_rad", "user_position_rad", "motor_position_rad", "motor_speed_rad_s", "current_A")
 
@@ -42,7 +42,7 @@ def measure(path: Path) -> None:
     read = time.perf_counter()
     found = compare([recording], actuator)
     compared = time.perf_counter()
-    write_report(found, path.with_suffix(".html"))
+    export(found, path.with_suffix(".html"))
     drawn = time.perf_counter()
     peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1e3
     print(

@@ -13,7 +13,7 @@ from test_campaign_command import Here
 
 from ema_model.actuator import load_actuator
 from ema_model.campaign import Store, thesis
-from ema_model.campaign.thesis import BY_NAME, DEVIATIONS
+from ema_model.campaign.thesis import BY_NAME, DEVIATIONS, Evaluation
 from ema_model.commands import command
 from ema_model.faults import NAMES, error_percent
 from ema_model.simulation.run import Run
@@ -84,6 +84,9 @@ def figures_of(html):
 @pytest.mark.long
 def test_the_result_follows_from_the_rows(made):
     told = result_of(made.parent / "r.json", "reproduce")
+    found = Evaluation(Store(made))
+    assert json.loads(json.dumps(found.to_dict(), allow_nan=False)).items() <= told.items()
+    assert "mean Err" in str(found) and "<table" in found._repr_html_()
     rows = {(one["case"], one["algorithm"]): one for one in told["rows"]}
     kept = [row for row in Store(made).table("identify", how=True).to_pylist() if row["group"] == "thesis"]
     assert {row["algorithm"] for row in kept} == {"ssa", "hba", "do"}

@@ -49,7 +49,7 @@ def test_the_schema_is_printed(capsys):
     assert main(["schema", "compare"]) == 0
     printed = json.loads(capsys.readouterr().out)
     assert printed["title"] == "emaviz compare --json"
-    region = printed["$defs"]["RegionJson"]["properties"]
+    region = printed["$defs"]["Region"]["properties"]
     assert {"from", "to", "rmse"} <= region.keys() and "unit" in region["rmse"]["description"]
     assert main(["schema", "actuator", "check"]) == 0
     assert "CheckedActuatorJson" in capsys.readouterr().out

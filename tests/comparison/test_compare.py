@@ -11,7 +11,7 @@ import pytest
 from support.hidden_effects import ACTUATOR, SINE, plant, recorded
 
 from ema_model.actuator import load_actuator
-from ema_model.comparison import as_dict, compare, regions
+from ema_model.comparison import compare, regions
 from ema_model.comparison.regions import worst_regions
 from ema_model.comparison.residuals import Residuals
 from ema_model.discovery.observed.transmission import transmission_seen
@@ -147,7 +147,7 @@ def test_regions_that_would_read_alike_say_their_range(monkeypatch):
 
 
 def test_json_is_whole_and_plain(cogged):
-    document = json.loads(json.dumps(as_dict(cogged), allow_nan=False))
+    document = json.loads(json.dumps(cogged.to_dict(), allow_nan=False))
     assert set(document) >= {"signals", "calibration", "explained_by", "orders", "worst_regions", "adequate"}
     assert set(document["signals"]["current_A"]) >= {"rmse", "nrmse", "noise_floor"}
     parameter = document["calibration"]["parameters"]["motor.inertia_kgm2"]
@@ -216,7 +216,7 @@ def test_linear_axis_speaks_of_newtons_and_metres(tmp_path):
     assert not found.adequate
     assert found.explained_by[0].variable == "user_position" and not found.orders
     assert any(re.search(r" N more force .* m?m than", sentence) for sentence in found.sentences), found.sentences
-    assert as_dict(found)["calibration"]["parameters"]["motor.mass_kg"]["unit"] == "kg"
+    assert found.to_dict()["calibration"]["parameters"]["motor.mass_kg"]["unit"] == "kg"
 
 
 OUTPUT = """

@@ -11,7 +11,7 @@ from support.unknown_drive import drive_of, logged
 
 from ema_model.actuator import load_actuator
 from ema_model.commands import command
-from ema_model.comparison import as_dict, compare
+from ema_model.comparison import compare
 from ema_model.comparison.result import errors, held_out, verdict
 from ema_model.discovery import discover
 from ema_model.estimation.floor import floor
@@ -183,7 +183,7 @@ STANDING = dict.fromkeys(
 def test_a_recording_that_tells_nothing_is_uninformative(healthy, made):
     """Whatever the model: it is not adequate by what was never measured."""
     result = compare([made(healthy)])
-    told = as_dict(result)
+    told = result.to_dict()
     assert told["verdict"] == "uninformative" and not told["adequate"]
     assert not told["explained_by"] and not told["worst_regions"] and not told["events"]
     assert told["signals"]["current_A"]["informative"] is False
@@ -203,7 +203,7 @@ def test_one_recording_of_two_that_tells_nothing_is_named(healthy):
     """The other one decides."""
     sensors = Sensors(current_noise_A=0.1, encoder_bits=16)
     still = replace(sensors.record(silenced(healthy, **STANDING), 2), name="parked")
-    both = as_dict(compare([replace(sensors.record(healthy, 1), name="moves"), still]))
+    both = compare([replace(sensors.record(healthy, 1), name="moves"), still]).to_dict()
     assert both["verdict"] == "adequate"
     assert [one["signals"]["current_A"]["informative"] for one in both["recordings"]] == [True, False]
     assert any(one.startswith("parked tells nothing of the model: the equivalent current") for one in both["warnings"])

@@ -12,7 +12,6 @@ from support.representative import first_of
 from ema_model.commands import command
 from ema_model.comparison import compare
 from ema_model.comparison.regions import _at_once
-from ema_model.comparison.result import as_dict
 from ema_model.discovery import discover
 from ema_model.recordings import Measurement
 from ema_model.recordings.measurement import Sensors
@@ -45,7 +44,7 @@ def test_a_load_that_comes_on_is_dated(torque_Nm):
     expected = torque_Nm * ACTUATOR.transmission.gear_ratio / ACTUATOR.motor.torque_constant_Nm_A
     assert event.change == pytest.approx(expected, rel=0.2)
     assert not found.adequate and found.sentences[0] == event.sentence
-    assert as_dict(found)["events"][0]["time_s"] == event.time_s
+    assert found.to_dict()["events"][0]["time_s"] == event.time_s
 
 
 @pytest.mark.parametrize(("signal", "by"), [("current_A", 2.0), ("motor_position_rad", 0.05)])

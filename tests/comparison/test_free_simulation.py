@@ -10,9 +10,8 @@ import pytest
 from support.unknown_drive import drive_of, logged
 
 from ema_model.actuator import load_actuator
-from ema_model.comparison import as_dict, compare
+from ema_model.comparison import compare
 from ema_model.comparison.free_simulation import _scores
-from ema_model.discovery import as_dict as discovery_as_dict
 from ema_model.discovery import discover
 from ema_model.models.open_loop import FreeMotion, free_motion
 from ema_model.recordings import Measurement
@@ -99,7 +98,7 @@ def test_what_adds_up_to_as_much_as_the_motion_has_no_number_but_a_reason(actuat
     recording = logged(4, noise_A=0.01, counts=None)
     bare = {**dict.fromkeys(TRUE, 1e-6), "motor.inertia_kgm2": 0.35e-4}
     result = compare([recording], actuator.varied(bare), calibrate=False)
-    told = json.loads(json.dumps(as_dict(result)))["simulation"]["motor_position_rad"]
+    told = json.loads(json.dumps(result.to_dict()))["simulation"]["motor_position_rad"]
     assert told["rmse"] is None and told["mae"] is None and told["percent_of_range"] is None
     assert "adds up" in told["reason"] and "rms" in told["reason"]
     assert f"No free simulation of the motor position: {told['reason']}." in str(result)
@@ -110,7 +109,7 @@ def test_a_closed_loop_s_free_simulation_is_what_its_table_of_errors_says():
     noise = Sensors(current_noise_A=0.1, encoder_bits=16)
     made = [noise.record(simulate_reference(Run(duration_s=0.2), load_actuator()), seed) for seed in (1, 2)]
     result = compare(made[:1], holdout=made[1:])
-    told = as_dict(result)
+    told = result.to_dict()
     assert set(told["simulation"]) == set(told["signals"])
     for name, one in told["simulation"].items():
         assert one["rmse"] == told["signals"][name]["rmse"] and one["mae"] == told["signals"][name]["mean_absolute"]
@@ -161,7 +160,7 @@ def stroke(seed: int, asymmetry_N: float = 3.0) -> Measurement:
 def test_a_force_driven_axis_is_scored_in_metres(axis):
     """Calibrated by inverse dynamics; what it lacks, a constant force, is the offset that is estimated."""
     result = compare([stroke(1)], axis, holdout=[stroke(2)])
-    told = as_dict(result)["simulation"]["motor_position_m"]
+    told = result.to_dict()["simulation"]["motor_position_m"]
     one = result.simulation["motor_position_m"]
     print(told)
     assert told["unit"] == "m" and told["rmse"] == one.fitted.rmse < 2e-3 and one.fitted.percent_of_range < 1.0
@@ -176,9 +175,9 @@ def test_a_discovery_scores_its_last_model_as_a_comparison_does(actuator):
 
     recordings = [logged(seed, noise_A=0.02, counts=None, hidden=hidden) for seed in (5, 6)]
     found = discover(recordings[:1], actuator, holdout=recordings[1:], candidates=["cogging_torque"], most_effects=1)
-    told = discovery_as_dict(found)["simulation"]["motor_position_rad"]
+    told = found.to_dict()["simulation"]["motor_position_rad"]
     again = compare(recordings[:1], found.actuator, calibrate=False, holdout=recordings[1:])
-    its = as_dict(again)["simulation"]["motor_position_rad"]
+    its = again.to_dict()["simulation"]["motor_position_rad"]
     print(told, its)
     assert [one.name for one in found.effects] == ["cogging_torque"]
     assert told["rmse"] == pytest.approx(its["rmse"], rel=1e-3)

@@ -6,7 +6,7 @@ import pytest
 from support.hidden_effects import ACTUATOR, recorded
 from support.representative import first_of
 
-from ema_model.discovery import as_dict, discover
+from ema_model.discovery import discover
 from ema_model.effects import CATALOGUE
 
 CHIRP = ("chirp", {}, 0.5)
@@ -41,5 +41,5 @@ def test_what_is_hidden_in_the_drive_is_named(name):
         assert found.parameters_outside_tolerance == [CATALOGUE[name].duplicates] and not found.effects
         return
     [one] = found.effects
-    assert one.name == name and as_dict(found)["effects"][0]["family"] == "drive"
+    assert one.name == name and found.to_dict()["effects"][0]["family"] == "drive"
     assert one.parameters[parameter].value == pytest.approx(value, rel=0.15)

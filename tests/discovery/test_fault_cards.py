@@ -8,7 +8,7 @@ from support.representative import first_of
 from ema_model.actuator import load_actuator
 from ema_model.commands import command
 from ema_model.comparison.criteria import BAND
-from ema_model.discovery import as_dict, begun, discover, result_of
+from ema_model.discovery import begun, discover, result_of
 from ema_model.discovery.next_experiment import next_experiment
 from ema_model.discovery.result import Candidate, Change
 from ema_model.discovery.snapshot import assessed
@@ -93,7 +93,7 @@ def test_the_command_line_ranks_faults_beside_effects():
     recordings = [recorded(run, {"k2": 0.3}, seed) for seed, run in enumerate((CHIRP, SINE))]
     found = discover(recordings, ACTUATOR, holdout=[recorded(UNSEEN, {"k2": 0.3}, 9)])
     assert list(found.faults) == ["k2"] and not found.effects
-    ranked = as_dict(found)["candidates"]
+    ranked = found.to_dict()["candidates"]
     assert ranked[0]["name"] == "k2" and ranked[0]["family"] == "fault" and ranked[0]["tested"]
     assert ranked[0]["settings"].keys() == {"k2"}
     assert FIRSTS <= {one["name"] for one in ranked}

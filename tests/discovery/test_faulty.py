@@ -16,7 +16,6 @@ from ema_model.discovery.discover import result_of
 from ema_model.discovery.result import Change
 from ema_model.discovery.search import Search
 from ema_model.discovery.terms import noise_of, terms_of
-from ema_model.discovery.words import as_dict
 from ema_model.estimation.model_fit import holdout_error
 from ema_model.faults import CAUSES, vector
 from ema_model.recordings.measurement import Sensors
@@ -93,7 +92,7 @@ def test_a_fault_stays_in_the_model_that_is_judged_shown_and_taken_back():
     assert holdout_error(story.held, story.current) < 1.1 < holdout_error(story.held, healthy)
     search.step()
     assert len(story.steps) == 2, "there is no second one"
-    told = as_dict(result_of(story))
+    told = result_of(story).to_dict()
     assert told["faults"]["k2"]["value"] == pytest.approx(0.2, abs=0.02)
     story.restart()
     assert story.current.faults == ("k2",), "effects are taken back, faults are not effects"

@@ -10,7 +10,7 @@ from ema_model.actuator import load_actuator
 from ema_model.commands import command
 from ema_model.discovery.begin import begun
 from ema_model.discovery.discover import result_of
-from ema_model.discovery.words import as_dict, document_of
+from ema_model.discovery.words import document_of
 from ema_model.faults import vector
 from ema_model.recordings.measurement import Sensors
 from ema_model.simulation.run import Run, simulate_reference
@@ -33,7 +33,7 @@ def test_a_rig_that_repeats_itself_bears_out_the_floor():
     twice = found.repeated
     assert twice is not None and twice.recordings == ("one", "again")
     assert 0.4 < twice.apart < 1.3 and twice.signals["current_A"] > 0.0
-    document = as_dict(found)
+    document = found.to_dict()
     assert document["floor_believable"] and document["ladder"][0]["rmse"] == pytest.approx(found.ladder[0].rmse)
     assert "one and again are of one command" in str(document_of(found))
 
@@ -42,7 +42,7 @@ def test_a_rig_that_does_not_has_errors_in_units_alone():
     found = found_in([recorded("one", 1), recorded("worn", 2, k1=0.6)])
     twice = found.repeated
     assert twice is not None and twice.apart > 2.0
-    document = as_dict(found)
+    document = found.to_dict()
     (rung,) = document["ladder"]
     assert document["floor_believable"] is False and document["repeatability"]["over_floor"] > 2.0
     assert rung["rmse"] is None and rung["holdout_rmse"] is None and rung["signals"]["current_A"] > 0.0
@@ -52,5 +52,5 @@ def test_a_rig_that_does_not_has_errors_in_units_alone():
 
 def test_where_no_command_was_repeated_nothing_is_said():
     found = found_in([recorded("one", 1), recorded("other", 2, 3.0)])
-    assert found.repeated is None and as_dict(found)["repeatability"] is None
-    assert as_dict(found)["floor_believable"]
+    assert found.repeated is None and found.to_dict()["repeatability"] is None
+    assert found.to_dict()["floor_believable"]

@@ -12,7 +12,7 @@ import pytest
 from ema_model.actuator import load_actuator, save_actuator
 from ema_model.commands import command
 from ema_model.comparison import compare
-from ema_model.discovery import as_dict, discover, verified
+from ema_model.discovery import discover, verified
 from ema_model.discovery.words import verification
 from ema_model.estimation.model_fit import with_effect
 from ema_model.faults import vector
@@ -129,7 +129,7 @@ def test_the_saved_model_is_verified_in_units_of_the_floor(saved):
 
 @pytest.mark.long
 def test_json_is_whole_and_plain():
-    document = json.loads(json.dumps(as_dict(improved()), allow_nan=False))
+    document = json.loads(json.dumps(improved().to_dict(), allow_nan=False))
     assert document["verdict"] == "effects_found"
     assert {"name", "parameters", "rmse_before", "rmse_after", "holdout_rmse_after", "same_as"} <= set(
         document["effects"][0]

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from support.hidden_effects import ACTUATOR, SINE, recorded
 
-from ema_model.discovery import as_dict, discover, search
+from ema_model.discovery import discover, search
 from ema_model.discovery.evidence import Unknowns, evidence_of, gains_of
 from ema_model.discovery.refit import Trial
 from ema_model.discovery.result import Candidate
@@ -108,7 +108,7 @@ def test_a_hidden_effect_is_named_with_how_probable_it_is():
     assert found.effects[0].probability == pytest.approx(1.0, abs=0.01)
     assert found.effects[0].parameters["amplitude_Nm"].value == pytest.approx(0.012, rel=0.1)
     assert found.effects[0].chosen["order"] == 12.0 and found.ladder[-1].rmse < 1.1
-    document = as_dict(found)
+    document = found.to_dict()
     assert document["effects"][0]["probability"] == found.effects[0].probability
     probable = [one["probability"] for one in document["candidates"]]
     assert probable == sorted(probable, reverse=True) and sum(probable) < 1.0 + 1e-9

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from support.hidden_effects import ACTUATOR, recorded
 
-from ema_model.discovery import as_dict, discover
+from ema_model.discovery import discover
 from ema_model.discovery import inverse as asked
 from ema_model.discovery.begin import begun, calibrated_story
 from ema_model.discovery.contradictions import contradictions
@@ -75,7 +75,7 @@ def test_a_law_that_is_another_one_is_seen_in_a_torque_too(healthy, fed_forward)
 @pytest.mark.parametrize("gone", [("user_position_rad",), ("motor_position_rad", "motor_speed_rad_s")])
 def test_a_loop_that_follows_another_way_is_told_with_one_position(gone, fed_forward):
     found = discover([without(one, *gone) for one in fed_forward], ACTUATOR, candidates=FEW)
-    assert as_dict(found)["controller_mismatch"] and found.loop_lag is not None
+    assert found.to_dict()["controller_mismatch"] and found.loop_lag is not None
     assert abs(found.loop_lag.measured_s) < 2e-4 and found.loop_lag.of_file_s == pytest.approx(5e-3, rel=0.06)
     assert "The controller is not what the file says. The position follows its command after" in str(found)
     assert "nothing shows another control law" not in str(found)
@@ -111,7 +111,7 @@ def test_inverse_dynamics_names_what_the_wrong_loop_cannot(cogging):
     (one,) = found.effects
     assert "inverse_dynamics" in one.supported_by
     assert one.parameters["amplitude_Nm"].value == pytest.approx(0.02, rel=0.15)
-    told = json.loads(json.dumps(as_dict(found), allow_nan=False))
+    told = json.loads(json.dumps(found.to_dict(), allow_nan=False))
     assert told["controller_mismatch"] is True and told["controller_seen"]["gains"][GAIN]["differs"]
     assert "The controller is not what the file says." in str(found)
     assert not any(one.at_bound for one in found.calibration.parameters.values())

@@ -10,7 +10,7 @@ import pytest
 from support.flexible_drive import LOAD, MOTOR, flexible_drive
 from support.unknown_drive import drive_of, logged
 
-from ema_model.discovery import as_dict, discover
+from ema_model.discovery import discover
 from ema_model.discovery.observed.two_masses import two_masses_seen
 from emaviz.cli import main
 
@@ -38,7 +38,7 @@ def test_one_mass_is_none(tmp_path, hidden):
 def test_a_discovery_names_them_where_its_model_holds_one(tmp_path):
     found = discover([flexible_drive(3)], drive_of(tmp_path, False), most_effects=1)
     assert "an antiresonance at 22" in str(found) and "two masses joined by a spring" in str(found).splitlines()[0]
-    told = as_dict(found)
+    told = found.to_dict()
     assert told["two_masses_seen"] is not None
     assert told["two_masses_seen"]["resonance_Hz"] == pytest.approx(22.0 * np.sqrt(3.0), rel=0.03)
     barred = {one["name"]: one for one in told["candidates"] if one["cannot_represent"]}

@@ -14,7 +14,7 @@ from ema_model.comparison.criteria import BAND
 from ema_model.comparison.residuals import Residuals
 from ema_model.comparison.result import SignalError
 from ema_model.comparison.verdict import judge, most_of_floor
-from ema_model.discovery import as_dict, begun, result_of
+from ema_model.discovery import begun, result_of
 from ema_model.discovery.history import Step, rung_of
 from ema_model.discovery.result import VERDICTS, Candidate, Contradiction
 from ema_model.discovery.snapshot import known_of
@@ -86,7 +86,7 @@ def test_verdict_and_ladder_never_contradict(healthy, lacking):
         assert found.verdict in VERDICTS and (found.verdict not in SURE or found.at_floor)
         assert found.at_floor == (rest <= most_of_floor(found.data.floor_spread) < BAND)
         assert not found.effects or found.verdict == ("effects_found" if found.at_floor else "partly_explained")
-        told = json.loads(json.dumps(as_dict(found), allow_nan=False))
+        told = json.loads(json.dumps(found.to_dict(), allow_nan=False))
         assert told["remaining"] == {"rmse": rest, "at_floor": found.at_floor}
     assert seen >= {"adequate", "effects_found", "partly_explained", "unknown_effect"}
 
@@ -110,7 +110,7 @@ def test_one_that_was_cut_off_says_so_with_what_it_has(lacking):
     bare, added = (result_of(story, interrupted=True) for story in lacking)
     assert headline(bare) == "The search was cut off before it had added anything."
     assert headline(added) == "The search was cut off. Found so far: load-dependent friction."
-    assert as_dict(added)["verdict"] == "interrupted" and len(added.ladder) == len(bare.ladder) + 1
+    assert added.to_dict()["verdict"] == "interrupted" and len(added.ladder) == len(bare.ladder) + 1
     assert str(added).startswith("interrupted: The search was cut off.")
 
 
@@ -139,7 +139,7 @@ def test_what_is_not_claimed_is_told_with_the_reason(healthy):
     said = "Something is missing, and nothing that was tried can be claimed for it: 1.08 times the floor remains"
     assert headline(unknown).startswith(said)
     assert "none of the known effects explains" in headline(replace(unknown, not_claimed={}))
-    assert as_dict(found)["not_claimed"] == {"torsional_compliance": "the fit with it did not converge"}
+    assert found.to_dict()["not_claimed"] == {"torsional_compliance": "the fit with it did not converge"}
 
 
 def test_what_stands_in_a_group_is_not_told_to_be_refused(lacking):

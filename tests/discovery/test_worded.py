@@ -13,7 +13,6 @@ from ema_model.discovery import words
 from ema_model.discovery.result import Change, StoodIn
 from ema_model.discovery.words import (
     NOT_REPEATABLE,
-    as_dict,
     effect_title,
     masked,
     moved,
@@ -24,7 +23,7 @@ from ema_model.discovery.words import (
 )
 from ema_model.estimation import Calibrated
 from ema_model.quantities.axes import ROTARY, Axes
-from emaviz.report import write_discovery_report
+from emaviz.views.export import export
 
 RAW = re.compile(r"[a-z]+\.[a-z_]+_|cogging_torque|torque_ripple|_Nm|_A\b")
 
@@ -45,9 +44,9 @@ def test_parameters_that_masked_an_effect_are_named_as_on_the_page(tmp_path):
         effects=[replace(one, stood_in=moved), later],
         warnings=[untold("cogging_torque", "torque_ripple"), NOT_REPEATABLE],
     )
-    assert lines[0] in as_dict(told)["warnings"] and lines[0] in sentences(told)
-    assert not any(RAW.search(line) for line in as_dict(told)["warnings"])
-    write_discovery_report(told, tmp_path / "report.html")
+    assert lines[0] in told.to_dict()["warnings"] and lines[0] in sentences(told)
+    assert not any(RAW.search(line) for line in told.to_dict()["warnings"])
+    export(told, tmp_path / "report.html")
     page = (tmp_path / "report.html").read_text(encoding="utf-8")
     assert "Cogging torque had been masked" in page and "tells cogging torque from torque ripple" in page
     shown = re.sub(r"<(script|style).*?</\1>", "", page, flags=re.S)

@@ -14,7 +14,7 @@ from support.duty_bench import logged as duty_logged
 from ema_model.actuator import Actuator
 from ema_model.actuator.file import parse_actuator
 from ema_model.comparison import compare
-from ema_model.comparison.result import Comparison, as_dict
+from ema_model.comparison.result import Comparison
 from ema_model.estimation.information import known_together
 from ema_model.recordings import Measurement
 
@@ -196,7 +196,7 @@ def test_where_a_voltage_limit_breaks_the_family_it_may_be_told():
 
 def test_what_is_known_only_together_is_said():
     result = FAMILIES["servo, strength"].compared(1)
-    document = as_dict(result)
+    document = result.to_dict()
     product = next(one for one in document["identifiable"] if one["members"] == {GAIN: 1, K: 1, R: -1, MOMENT: -1})
     said = "controller gain · motor torque constant / (motor resistance · pendulum load: moment)"
     assert product["combination"] == said

@@ -15,7 +15,6 @@ from ema_model.effects.user import torque_curve, user_torque
 from ema_model.exports import mjcf
 from ema_model.exports.exported import exported
 from ema_model.exports.replay import proof_of
-from ema_model.exports.result import as_dict
 from ema_model.recordings import Measurement
 from emaviz.cli import main
 
@@ -106,7 +105,7 @@ def test_users_own_torques_are_told(tmp_path):
     result = em.export(replace(bare("xl330"), effects=effects), tmp_path / "home", ["mjcf"])
     shares = {one.what: one.share for one in result.targets[0].cannot_hold}
     assert shares["torque curve"] > 0.01 and np.isnan(shares["user's torque"])
-    assert as_dict(result)["export"]["mjcf"]["cannot_hold"][-1] == {"what": "user's torque", "share": None}
+    assert result.to_dict()["export"]["mjcf"]["cannot_hold"][-1] == {"what": "user's torque", "share": None}
 
 
 def test_a_drive_that_is_off_lets_the_joint_go(tmp_path):

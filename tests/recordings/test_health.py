@@ -17,7 +17,7 @@ from ema_model.recordings import (
     can_have_current,
     with_equivalent_current,
 )
-from ema_model.recordings.health import health
+from ema_model.recordings.health import Health, health
 from ema_model.recordings.measurement import Sensors
 from ema_model.recordings.read import prepared
 from ema_model.simulation.run import Run, simulate_reference
@@ -75,7 +75,8 @@ def test_the_worst_finding_is_the_cards():
     found = card(reference())
     worst = max(("good", "note", "warning").index(finding.severity) for finding in found.findings)
     assert found.severity == ("good", "note", "warning")[worst]
-    json.dumps(found.as_dict(), allow_nan=False)
+    told = json.loads(json.dumps(found.to_dict(), allow_nan=False))
+    assert Health.from_dict(told).to_dict() == told and str(Health.from_dict(told)) == str(found)
     assert all(finding.sentence.endswith(".") and finding.sentence.isprintable() for finding in found.findings)
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import errno
+import json
 import os
 import re
 from collections.abc import Iterator
@@ -18,8 +19,9 @@ from ema_model.errors import InputError
 from ema_model.recordings.health import Finding, Health
 from emaviz.page.compare.result import numbers
 from emaviz.recording.writer import written
-from emaviz.report import write_report
-from emaviz.report.comparison import ErrorsPerSignal
+from emaviz.report.html_document import Figures
+from emaviz.views.comparison import VIEW
+from emaviz.views.export import export, markup
 
 HOSTILE = '</script><script>window.bad = 1</script><img src="x" onerror="window.bad = 2">&amp;'
 
@@ -27,7 +29,7 @@ HOSTILE = '</script><script>window.bad = 1</script><img src="x" onerror="window.
 @pytest.fixture(scope="module")
 def report(comparison: Comparison, tmp_path_factory: pytest.TempPathFactory) -> Path:
     path = tmp_path_factory.mktemp("report") / "report.html"
-    write_report(comparison, path)
+    export(comparison, path)
     return path
 
 
@@ -49,6 +51,21 @@ def test_it_says_what_was_found(report, comparison):
     assert "+3.00" in text and "Motor inertia stands at the bound" in text
 
 
+def test_the_result_shows_and_exports_itself(report, comparison, tmp_path):
+    assert len(comparison.figures()) == _own_text(report).count("data-figure=") > 10
+    comparison.export(tmp_path / "errors.csv")
+    head, *rows = (tmp_path / "errors.csv").read_text().splitlines()
+    assert head.startswith("signal,rmse,") and [one.split(",")[0] for one in rows] == list(comparison.signals)
+    assert float(rows[0].split(",")[1]) == comparison.signals["current_A"].rmse
+    comparison.export(tmp_path / "all.json")
+    told = json.loads((tmp_path / "all.json").read_text())
+    assert told == json.loads(json.dumps(comparison.to_dict())) and told["worst_regions"][0]["from"] > 0.0
+    with pytest.raises(InputError, match="end in one of these"):
+        comparison.export(tmp_path / "all.docx")
+    with pytest.raises(InputError, match="compute it anew"):  # its series are not told
+        Comparison.from_dict(told)
+
+
 def test_every_link_leads_somewhere(report):
     text = _own_text(report)
     links, anchors = set(re.findall(r'href="#([^"]+)"', text)), set(re.findall(r'id="([^"]+)"', text))
@@ -57,7 +74,7 @@ def test_every_link_leads_somewhere(report):
 
 def test_nothing_is_calibrated_and_nothing_stands_out(comparison, tmp_path):
     plain = replace(comparison, calibration=None, worst_regions=(), orders=(), explained_by=(), adequate=True)
-    write_report(plain, tmp_path / "r.html")
+    export(plain, tmp_path / "r.html")
     text = _own_text(tmp_path / "r.html")
     assert 'id="calibration"' not in text and "No region stands out" in text and ">adequate<" in text
 
@@ -85,7 +102,7 @@ def _hostile(comparison: Comparison) -> Comparison:
 
 
 def test_hostile_names_stay_text(comparison, tmp_path):
-    write_report(_hostile(comparison), tmp_path / "r.html")
+    export(_hostile(comparison), tmp_path / "r.html")
     text = _own_text(tmp_path / "r.html")
     assert "window.bad" in text  # it is shown
     assert "<script>window" not in text and "<img" not in text and 'onerror="' not in text
@@ -97,7 +114,7 @@ def test_hostile_names_stay_text(comparison, tmp_path):
 def test_a_place_that_cannot_be_written_is_told_in_one_line(comparison, tmp_path, place, why):
     (tmp_path / "file").write_text("")
     with pytest.raises(InputError, match=why) as error:
-        write_report(comparison, tmp_path / place)
+        export(comparison, tmp_path / place)
     assert "\n" not in str(error.value) and str(tmp_path) in str(error.value)
 
 
@@ -109,7 +126,7 @@ def test_a_full_disk_leaves_the_old_report_and_no_draft(comparison, tmp_path, mo
 
     monkeypatch.setattr(os, "replace", full)
     with pytest.raises(InputError, match="No space left"):
-        write_report(comparison, tmp_path / "r.html")
+        export(comparison, tmp_path / "r.html")
     assert [path.name for path in tmp_path.iterdir()] == ["r.html"]
     assert (tmp_path / "r.html").read_text() == "old"
 
@@ -216,7 +233,7 @@ def test_it_follows_light_and_dark_and_prints_whole(report, tab):
 @pytest.mark.long
 @pytest.mark.browser
 def test_hostile_names_do_nothing_in_a_browser(comparison, tab, tmp_path):
-    write_report(_hostile(comparison), tmp_path / "r.html")
+    export(_hostile(comparison), tmp_path / "r.html")
     tab.goto((tmp_path / "r.html").as_uri())
     _draw_all(tab)
     assert tab.evaluate("window.bad") is None and tab.complaints == []
@@ -245,7 +262,8 @@ def test_an_error_reads_alike_wherever_it_is_told(sizes, comparison):
     row = next(line for line in str(told).splitlines() if line.startswith("  Equivalent current ")).split()
     assert row[3] == size and row[4] == least and row[-1] == unit  # behind its name and what it was before
     page, notebook = numbers(told), told._repr_html_()
-    report = ErrorsPerSignal().body(told, None)  # pyright: ignore[reportArgumentType]
+    section = next(one for one in VIEW.sections if one.anchor == "errors")
+    report = markup(section.pieces(told), Figures())
     for one in (page, notebook, report):
         cells = re.findall(r">([^<>]+)</td>", one)
         at = cells.index("Equivalent current")

@@ -17,8 +17,8 @@ from ema_model.discovery.words import value
 from ema_model.errors import InputError
 from ema_model.quantities.numbers import number
 from emaviz.figures import discovery
-from emaviz.report import write_discovery_report
 from emaviz.text.html import mathml
+from emaviz.views.export import export
 
 HOSTILE = '</script><script>window.bad = 1</script><img src="x" onerror="window.bad = 2">&amp;'
 
@@ -33,14 +33,14 @@ def report(found: Discovery, tmp_path_factory: pytest.TempPathFactory) -> Path:
     path = tmp_path_factory.mktemp("report") / "report.html"
     rival = replace(found.effects[0], same_as=("torque_ripple",))
     told = replace(found, effects=[rival], parameters_outside_tolerance=("motor.inertia_kgm2",))
-    write_discovery_report(told, path, {"files": ["sine.csv", "chirp.csv"], "max_effects": 1, "json": None})
+    export(told, path, {"files": ["sine.csv", "chirp.csv"], "max_effects": 1, "json": None})
     return path
 
 
 @pytest.fixture(scope="module")
 def unknown(tmp_path_factory: pytest.TempPathFactory) -> Path:
     path = tmp_path_factory.mktemp("report") / "unknown.html"
-    write_discovery_report(with_unknown(), path)
+    export(with_unknown(), path)
     return path
 
 
@@ -105,7 +105,7 @@ def test_next_experiment_is_told_only_where_there_is_one(report):
 def test_next_experiment_and_warnings_are_in_plain_words(found, tmp_path):
     rivals = ("asymmetric_friction", "current_sensor_bias")
     best = Experiment("step", {"final_rad": 0.01}, 0.5, 12.0, "motor_position_rad", rivals, 140.0)
-    write_discovery_report(replace(found, next_experiment=best, warnings=("Look here.",)), tmp_path / "r.html")
+    export(replace(found, next_experiment=best, warnings=("Look here.",)), tmp_path / "r.html")
     text = _section(tmp_path / "r.html", "next")
     assert "Record a step with final 0.01 rad, for " in text and "12.0 N·m" in text and "motor position as well" in text
     assert "asymmetric friction and current sensor bias apart" in text and "140" in text
@@ -130,7 +130,7 @@ def test_hostile_names_stay_text(found, tmp_path):
     kept, plant.windows = plant.windows, windows
     try:
         told = replace(found, actuator=replace(found.actuator, name=HOSTILE), warnings=(HOSTILE,))
-        write_discovery_report(told, tmp_path / "r.html", {"files": [HOSTILE]})
+        export(told, tmp_path / "r.html", {"files": [HOSTILE]})
     finally:
         plant.windows = kept
     text = _own_text(tmp_path / "r.html")
@@ -141,7 +141,7 @@ def test_hostile_names_stay_text(found, tmp_path):
 @pytest.mark.parametrize(("place", "why"), [(".", "is a folder"), ("none/r.html", "does not exist")])
 def test_a_place_that_cannot_be_written_is_told_in_one_line(found, tmp_path, place, why):
     with pytest.raises(InputError, match=why) as error:
-        write_discovery_report(found, tmp_path / place)
+        export(found, tmp_path / place)
     assert "\n" not in str(error.value) and str(tmp_path) in str(error.value)
 
 

@@ -18,7 +18,7 @@ from ema_model.campaign import bam
 from ema_model.campaign.kinds.kind import NUMBER, NUMBERS, TEXT, TEXTS, Kind
 from ema_model.campaign.plan_axes import TaskInputs
 from ema_model.comparison.free_simulation import in_open_loop
-from ema_model.discovery import as_dict, discover
+from ema_model.discovery import discover
 from ema_model.errors import InputError, quoted
 from ema_model.models import ClosedLoop, InverseDynamics
 from ema_model.models.measured_motion import Stretch
@@ -264,7 +264,7 @@ def _run(inputs: TaskInputs, settings: Settings, seed: int) -> dict[str, Any]:
 def _discovered(inputs: TaskInputs, settings: Settings) -> tuple[dict[str, Any], Actuator]:
     """By `discover` alone, which never sees what is held out: given to it, that would weigh models as well."""
     found = discover(inputs.fitted, inputs.actuator)
-    told = as_dict(found)
+    told = found.to_dict()
     parameters = {
         **{name: _short(one) for name, one in told["calibration"]["parameters"].items()},
         **{f"{one['name']}.{name}": _short(p) for one in told["effects"] for name, p in one["parameters"].items()},

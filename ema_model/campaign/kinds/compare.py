@@ -11,7 +11,7 @@ import pyarrow as pa
 
 from ema_model.campaign.kinds.kind import FLAG, NUMBER, NUMBERS, TEXT, Kind
 from ema_model.campaign.plan_axes import TaskInputs
-from ema_model.comparison import as_dict, compare
+from ema_model.comparison import compare
 
 
 @dataclass(frozen=True)
@@ -22,7 +22,7 @@ class Settings:
 
 
 def _run(inputs: TaskInputs, settings: Settings, seed: int) -> dict[str, Any]:
-    found = as_dict(compare(inputs.fitted, inputs.actuator, calibrate=settings.calibrate, holdout=inputs.held))
+    found = compare(inputs.fitted, inputs.actuator, calibrate=settings.calibrate, holdout=inputs.held).to_dict()
     first = next((one for one in found["explained_by"] if one["significant"]), {})
     error, calibration = found["signals"][found["primary"]], found["calibration"]
     return {

@@ -16,7 +16,7 @@ from ema_model.campaign.kinds.kind import FLAG, NUMBER, NUMBERS, TEXT, TEXTS, Ki
 from ema_model.campaign.plan_axes import TaskInputs
 from ema_model.comparison.compare import weights_of
 from ema_model.comparison.criteria import BAND
-from ema_model.discovery import as_dict, discover
+from ema_model.discovery import discover
 from ema_model.errors import InputError, quoted
 from ema_model.estimation.calibrate import problem_of
 from ema_model.estimation.model_fit import fit, gather
@@ -72,15 +72,13 @@ def _run(inputs: TaskInputs, settings: Settings, seed: int) -> dict[str, Any]:
         asked["showable"] = showable(inputs.fitted, inputs.actuator, inputs.effects, signals)
         if asked["showable"] < settings.showable_from:
             return asked
-    found = as_dict(
-        discover(
-            inputs.fitted,
-            inputs.actuator,
-            holdout=inputs.held,
-            signals=signals,
-            most_effects=settings.most_effects,
-        )
-    )
+    found = discover(
+        inputs.fitted,
+        inputs.actuator,
+        holdout=inputs.held,
+        signals=signals,
+        most_effects=settings.most_effects,
+    ).to_dict()
     ladder, faults, experiment = found["ladder"], found["faults"], found["next_experiment"]
     unknown, calibrated = found["unknown"], found["calibration"]["parameters"]
     return asked | {

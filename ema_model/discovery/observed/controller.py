@@ -10,8 +10,10 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
+from msgspec import Meta
 from numpy.typing import NDArray
 from scipy.ndimage import maximum_filter1d, uniform_filter1d
 
@@ -22,6 +24,7 @@ from ema_model.models import Model
 from ema_model.models.measured_motion import Motion, motion_of
 from ema_model.quantities.numbers import HALF_90
 from ema_model.recordings import Measurement
+from ema_model.result import NAME, as_named
 
 Array = NDArray[np.float64]
 
@@ -37,15 +40,24 @@ _LEAST_ROWS = 60
 
 @dataclass(frozen=True)
 class Gain:
-    """A gain as the drive's current tells it, beside the file's."""
+    """A gain of the controller, in the unit that ends its name."""
 
     path: str  # "controller.speed_gain_Nms_rad"
-    file: float
-    seen: float
+    file: Annotated[float, Meta(description="what the actuator's file says")]
+    seen: Annotated[float, Meta(description="what the drive's current tells")]
     half: float  # of its 90 % interval
 
     @property
-    def differs(self) -> bool:
+    def interval90(
+        self,
+    ) -> Annotated[tuple[float, float], Meta(description="the ends of the 90 % interval about seen")]:
+        """Half of it to each side."""
+        return self.seen - self.half, self.seen + self.half
+
+    @property
+    def differs(
+        self,
+    ) -> Annotated[bool, Meta(description="whether it is another than the file's, for sure and by much")]:
         """Whether it is another than the file's, for sure and by much."""
         away = abs(self.seen - self.file)
         return away > max(GAIN_APART * abs(self.file), 2.0 * self.half)
@@ -53,16 +65,27 @@ class Gain:
 
 @dataclass(frozen=True)
 class ControllerSeen:
-    """The drive's law beside the file's."""
+    """The drive's controller, by its current, where it is not the file's."""
 
     gains: tuple[Gain, ...]
-    delay_s: float  # that it answers later by than the file's controller, beyond the delay between the signals
-    left_by_file: float  # of the current's rms, that the file's controller does not tell
-    left: float  # and the same law with the gains and the delay that suit best
+    delay_s: Annotated[  # beyond the delay between the signals
+        float, Meta(description="s, by which it answers later than the file's controller")
+    ]
+    left_by_file: Annotated[float, Meta(description="share of the current's rms that the file's controller misses")]
+    left: Annotated[float, Meta(description="the same with the gains and the delay that suit best")]
     sample_s: float  # of the recording
 
     @property
-    def holds(self) -> bool:
+    def by_path(
+        self,
+    ) -> Annotated[dict[str, Gain], as_named("gains", "by their names in the actuator's file", **NAME)]:
+        """The gains."""
+        return {one.path: one for one in self.gains}
+
+    @property
+    def holds(
+        self,
+    ) -> Annotated[bool, as_named("same_form", "whether the law of the file's controller tells the current at all")]:
         """Whether the law tells the current at all, with gains of its own."""
         return self.left < LAW_HOLDS
 

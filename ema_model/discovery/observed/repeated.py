@@ -9,14 +9,17 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import combinations
+from typing import Annotated
 
 import numpy as np
+from msgspec import Meta
 
 from ema_model.actuator import Actuator
 from ema_model.estimation import Floor
 from ema_model.estimation.model_fit import Data
 from ema_model.models.model import Window
 from ema_model.recordings import Measurement
+from ema_model.result import NAME, NULL, as_named
 
 _MOST = 2.0  # floors that two recordings of one command may be apart, for the floor to be believed
 _SAME = 1e-3  # of a command's range, within which two are the same
@@ -25,11 +28,11 @@ _LENGTH = 0.02  # of their lengths, that they may differ by
 
 @dataclass(frozen=True)
 class Repeated:
-    """Two recordings of one command."""
+    """The two recordings of one command that are furthest apart."""
 
-    recordings: tuple[str, str]
-    apart: float  # rms of their difference over √2, in floors
-    signals: dict[str, float]  # the same of each signal, in its unit
+    recordings: Annotated[tuple[str, str], Meta(description="their names")]
+    apart: Annotated[float, as_named("over_floor", "rms of their difference over √2, in floors", **NULL)]
+    signals: Annotated[dict[str, float], Meta(description="the same by signal, in its unit", extra={**NAME, **NULL})]
 
     @property
     def floor_believable(self) -> bool:

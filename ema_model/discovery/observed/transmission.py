@@ -10,8 +10,10 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
+from msgspec import Meta
 from numpy.typing import NDArray
 
 from ema_model.actuator import Actuator
@@ -44,14 +46,20 @@ _CAUSES = {
 
 @dataclass(frozen=True)
 class TransmissionSeen:
-    """By how much the user's position leaves the motor's, at the user in rad (m of a linear axis), rms."""
+    """By how much the user's position leaves gear ratio × motor's position."""
 
-    error: float
-    noise: float
-    cause: str  # of _SHORT; "" where none explains most of it
-    period: float | None = None  # at the motor, rad or m, where it repeats with the position
-    amplitude: float | None = None
-    frequency_Hz: float | None = None  # of the user's inertia on a shaft that gives, with the motor held
+    error: Annotated[float, Meta(description="rms at the user, rad (m on a linear axis)")]
+    noise: Annotated[float, Meta(description="rms that the two sensors' noise makes, likewise")]
+    cause: Annotated[  # of _SHORT; "" where none explains most of it
+        str, Meta(description="acceleration, bandwidth, direction, position; empty: not known")
+    ]
+    period: Annotated[float | None, Meta(description="at the motor, rad or m, where it repeats with the position")] = (
+        None
+    )
+    amplitude: Annotated[float | None, Meta(description="of what repeats, at the user, rad or m")] = None
+    frequency_Hz: Annotated[float | None, Meta(description="Hz, of the user on a shaft that gives, the motor held")] = (
+        None
+    )
 
     @property
     def short(self) -> str:

@@ -16,8 +16,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
+from msgspec import Meta
 from numpy.typing import NDArray
 
 from ema_model.actuator import Actuator
@@ -58,13 +60,15 @@ class FrequencyResponse:
 
 @dataclass(frozen=True)
 class TwoMasses:
-    """An antiresonance and a resonance, as of two masses joined by a spring; at the motor."""
+    """Two masses joined by a spring, seen in the motor alone, from torque to speed."""
 
-    antiresonance_Hz: float
-    resonance_Hz: float
-    inertia_ratio: float  # the load's over the motor's
-    stiffness: float  # N·m/rad, of a linear motor N/m, of the torque as the file scales it
-    coherence: float  # mean γ² of the frequencies that count
+    antiresonance_Hz: Annotated[float, Meta(description="at which the load swings alone and holds the motor")]
+    resonance_Hz: Annotated[float, Meta(description="at which motor and load swing against each other")]
+    inertia_ratio: Annotated[float, Meta(description="the load's inertia over the motor's")]
+    stiffness: Annotated[  # of the torque as the file scales it
+        float, Meta(description="of what joins them, at the motor: N·m/rad, of a linear motor N/m")
+    ]
+    coherence: Annotated[float, Meta(description="of the motion with the torque, mean over the frequencies that count")]
 
     @property
     def short(self) -> str:

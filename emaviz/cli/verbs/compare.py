@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Mapping
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from ema_model.errors import InputError
 from emaviz.cli import options
@@ -44,11 +43,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def documents() -> tuple[type, ...]:
     """What --json holds: of recordings, and of units beside each other."""
-    from ema_model.comparison.result import ComparisonJson
+    from ema_model.comparison.result import Comparison
     from ema_model.fleet.result import UnitsCompared
     from ema_model.result import json_type
 
-    return (ComparisonJson, json_type(UnitsCompared))
+    return (json_type(Comparison), json_type(UnitsCompared))
 
 
 def run(arguments: argparse.Namespace) -> int:
@@ -67,7 +66,7 @@ def run(arguments: argparse.Namespace) -> int:
     to_fit = option_values.effects_to_fit(arguments) if arguments.calibrate else []
 
     def compute(fitted: list[Measurement], held: list[Measurement], progress: output.Progress) -> flow.Answer:
-        from ema_model.comparison import as_dict, compare  # takes a second: recordings are refused before
+        from ema_model.comparison import compare  # takes a second: recordings are refused before
 
         model, fixed, free = actuator, effects, arguments.free
         if to_fit:
@@ -90,17 +89,7 @@ def run(arguments: argparse.Namespace) -> int:
             on_progress=progress.show,
         )
 
-        def record(path: str, configuration: Mapping[str, Any]) -> None:
-            from emaviz.recording.comparison import write_comparison
-
-            write_comparison(result, path, configuration)
-
-        def report(path: str, _: Mapping[str, Any]) -> None:
-            from emaviz.report import write_report
-
-            write_report(result, path)
-
         found = result.calibration.actuator if result.calibration is not None else None
-        return flow.Answer(result, as_dict(result), found, record, report)
+        return flow.of_result(result, found)
 
     return flow.run(arguments, actuator, compute)

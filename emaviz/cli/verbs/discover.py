@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Mapping
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 from emaviz.cli import options
@@ -32,10 +32,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def documents() -> tuple[type, ...]:
     """What --json holds: of recordings, and of units beside each other."""
-    from ema_model.discovery.words import DiscoveryJson
-    from ema_model.fleet.discovery import UnitsDiscoveredJson
+    from ema_model.discovery import Discovery
+    from ema_model.fleet.discovery import UnitsDiscovered
+    from ema_model.result import json_type
+    from emaviz.cli.documents import SavedModelJson
 
-    return (DiscoveryJson, UnitsDiscoveredJson)
+    return (json_type(Discovery, SavedModelJson), json_type(UnitsDiscovered))
 
 
 def run(arguments: argparse.Namespace) -> int:
@@ -51,11 +53,11 @@ def run(arguments: argparse.Namespace) -> int:
 
     def compute(fitted: list[Measurement], held: list[Measurement], progress: output.Progress) -> flow.Answer:
         # These take a second: recordings are refused before.
-        from ema_model.discovery import as_dict, discover, verified
+        from ema_model.discovery import discover, verified
         from ema_model.discovery.words import verification
         from ema_model.quantities.numbers import plain
 
-        with PartialAnswer() as answer:
+        with PartialAnswer() as partial:
             found = discover(
                 fitted,
                 actuator,
@@ -63,7 +65,7 @@ def run(arguments: argparse.Namespace) -> int:
                 signals=signals,
                 most_effects=arguments.max_effects,
                 on_progress=progress.show,
-                stop=answer.is_interrupted,
+                stop=partial.is_interrupted,
             )
 
         def saved() -> tuple[str, dict[str, Any]]:
@@ -76,17 +78,7 @@ def run(arguments: argparse.Namespace) -> int:
             }
             return f"saved {arguments.save_actuator}, {verification(found, again)}", {"saved_actuator": plain(of_saved)}
 
-        def record(path: str, configuration: Mapping[str, Any]) -> None:
-            from emaviz.recording.discovery import write_discovery
-
-            write_discovery(found, path, configuration)
-
-        def report(path: str, configuration: Mapping[str, Any]) -> None:
-            from emaviz.report import write_discovery_report
-
-            write_discovery_report(found, path, configuration)
-
-        is_whole = found.verdict != "interrupted"
-        return flow.Answer(found, plain(as_dict(found)), found.actuator, record, report, is_whole, saved)
+        answer = flow.of_result(found, found.actuator)
+        return replace(answer, is_whole=found.verdict != "interrupted", saved=saved)
 
     return flow.run(arguments, actuator, compute)

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Mapping
-from typing import Any
 
 from ema_model.members import stated_in
 from emaviz.cli import options
@@ -39,9 +37,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def documents() -> tuple[type, ...]:
     """What --json holds."""
-    from ema_model.exports.result import ExportJson
+    from ema_model.exports.result import Export
+    from ema_model.result import json_type
 
-    return (ExportJson,)
+    return (json_type(Export),)
 
 
 def run(arguments: argparse.Namespace) -> int:
@@ -51,7 +50,6 @@ def run(arguments: argparse.Namespace) -> int:
     check_folder(arguments.out)  # before recordings are read
     from ema_model.actuator import load_actuator
     from ema_model.exports.export import export
-    from ema_model.exports.result import as_dict
     from ema_model.recordings.recording_set import files_of
     from emaviz.cli import flow, option_values, output
 
@@ -69,12 +67,6 @@ def run(arguments: argparse.Namespace) -> int:
             fmi=arguments.fmi,
             on_progress=progress.show,
         )
-
-        def report(path: str, _: Mapping[str, Any]) -> None:
-            from emaviz.report import write_export_report
-
-            write_export_report(result, path)
-
-        return flow.finish(arguments, flow.Answer(result, as_dict(result), report=report), progress)
+        return flow.finish(arguments, flow.of_result(result), progress)
     finally:
         progress.done()

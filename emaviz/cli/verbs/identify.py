@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import math
-from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
@@ -51,9 +49,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def documents() -> tuple[type, ...]:
     """What --json holds: of a whole identification, and of one that was interrupted."""
-    from ema_model.identification.words import IdentificationJson, IdentifiedSoFarJson
+    from ema_model.identification.run import Identification, IdentifiedSoFar
+    from ema_model.result import json_type
 
-    return (IdentificationJson, IdentifiedSoFarJson)
+    return (json_type(Identification), json_type(IdentifiedSoFar))
 
 
 def run(arguments: argparse.Namespace) -> int:
@@ -94,10 +93,9 @@ def _identified(
         from ema_model.discovery.begin import with_fitted_effects
 
         actuator = with_fitted_effects(fitted, actuator, to_fit, progress.show)
-    from ema_model.identification.run import SEARCH_SHARE, identify
+    from ema_model.identification.run import SEARCH_SHARE, IdentifiedSoFar, identify
     from ema_model.identification.search import Objective
-    from ema_model.identification.words import as_dict
-    from emaviz.cli import flow
+    from emaviz.cli import flow, output
 
     def fitness(of: list[Measurement]) -> Objective:
         return Objective(of, actuator, circuit=arguments.circuit, fitness=arguments.fitness)
@@ -135,11 +133,14 @@ def _identified(
     except BaseException as error:
         if isinstance(error, KeyboardInterrupt) and history:
             progress.done()
-            _say_so_far(history, actuator, arguments)
+            best = IdentifiedSoFar(actuator, history)
+            output.write_json(arguments, best.to_dict())
+            print(best)
+            output.say_not_written(arguments, "report", "save_actuator")
         if recorder is not None:
             recorder.close()
         raise
-    error = None if unseen is None else _finite(unseen(answer.k)[0])
+    answer = answer.beside(unseen)
 
     def record(*_: object) -> None:
         if recorder is not None:
@@ -147,44 +148,7 @@ def _identified(
             if recorder.failed:
                 raise InputError(recorder.failed)
 
-    def report(path: str, configuration: Mapping[str, Any]) -> None:
-        from emaviz.report import write_identification_report
-
-        write_identification_report(answer, objective, path, error, configuration)
-
-    words = "\n".join([str(answer), *_of_unseen(error, answer.rmse, held)])
-    return flow.Answer(words, as_dict(answer, actuator, error), answer.found_actuator, record, report)
-
-
-def _of_unseen(error: float | None, fitted: float, held: list[Measurement]) -> Iterator[str]:
-    """How far the model is from what was not fitted; error and fitted in A."""
-    from ema_model.quantities.numbers import amount
-
-    if held and error is None:
-        yield "the model diverges on what was not fitted"
-    elif error is not None:
-        names = ", ".join(one.name for one in held)
-        beside = f"{amount(fitted, 'A')} on what was"
-        yield f"uncorrected error {amount(error, 'A')} on what was not fitted, {beside}: {names}"
-
-
-def _say_so_far(history: list[Progress], actuator: Actuator, arguments: argparse.Namespace) -> None:
-    """Writes and prints the best of a search that was interrupted, and how it came there."""
-    from ema_model.actuator.actuator import sentences
-    from ema_model.faults import NAMES
-    from ema_model.identification.run import algorithm_title
-    from ema_model.identification.words import so_far_as_dict
-    from ema_model.quantities.numbers import amount
-    from emaviz.cli import output
-
-    last = history[-1]
-    output.write_json(arguments, so_far_as_dict(history, actuator))
-    where = f"at iteration {last.iteration} of {last.iterations} of {algorithm_title(last.algorithm)}"
-    print(f"Interrupted {where}: the best k so far, which no fit has refined, without intervals.")
-    for name, value, phrase in zip(NAMES, last.k, sentences(last.k, actuator)):
-        print(f"  {name}  {value:.4f}  {phrase}")
-    print(f"uncorrected error {amount(last.rmse, 'A')}, {last.evaluations} simulations in {last.elapsed_s:.1f} s")
-    output.say_not_written(arguments, "report", "save_actuator")
+    return replace(flow.of_result(answer, answer.found_actuator), record=record)
 
 
 def _simulated(arguments: argparse.Namespace, actuator: Actuator, truth: np.ndarray | None) -> Measurement:
@@ -200,10 +164,6 @@ def _simulated(arguments: argparse.Namespace, actuator: Actuator, truth: np.ndar
     except FloatingPointError as error:
         raise InputError(str(error)) from None
     return sensors.record(clean, arguments.seed)
-
-
-def _finite(value: float) -> float | None:
-    return float(value) if math.isfinite(value) else None
 
 
 class _Recorder:

@@ -31,9 +31,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def documents() -> tuple[type, ...]:
     """What --json holds."""
-    from ema_model.campaign.thesis import EvaluationJson
+    from ema_model.campaign.thesis import Evaluation
+    from ema_model.result import json_type
 
-    return (EvaluationJson,)
+    return (json_type(Evaluation),)
 
 
 def run(arguments: argparse.Namespace) -> int:
@@ -42,9 +43,9 @@ def run(arguments: argparse.Namespace) -> int:
     from ema_model.campaign import Store, load_plan, run_plan, scheduler
     from ema_model.campaign.plan import plan_path
     from ema_model.campaign.thesis import Evaluation, drawn
+    from ema_model.campaign.thesis_words import aligned, answer, short_table
     from emaviz.cli import output
     from emaviz.text.campaign import interrupted
-    from emaviz.text.reproduce import aligned, answer, short_table
 
     plan = load_plan(plan_path(arguments.plan or ("thesis_quick" if arguments.quick else "thesis")))
     if "identify" not in {task.kind for task in plan.tasks}:
@@ -74,7 +75,7 @@ def run(arguments: argparse.Namespace) -> int:
         write_reproduction(found, responses, folder / RECORDING)
     finally:
         progress.done()
-    output.write_json(arguments, found.as_dict())
+    output.write_json(arguments, found.to_dict())
     print(aligned(*short_table(found)))
     print("", *answer(found), sep="\n")
     if status.errors:

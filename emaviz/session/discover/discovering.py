@@ -125,17 +125,12 @@ def keep(look: Look, folder: DataFolder, suffix: str) -> Path:
         "held out": ", ".join(look.held) or "–",
         "actuator": found.actuator.name,
     }
-    # Imported when wanted: rerun and the report's figures take half a second of the app's start.
-    if suffix == ".html":
-        from emaviz.report import write_discovery_report
-
-        write_discovery_report(found, path, configuration)
-    elif suffix == ".rrd":
-        from emaviz.recording.discovery import write_discovery
-
-        write_discovery(found, path, configuration)
-    else:
+    if suffix == ".toml":
         save_actuator(found.actuator, path)
+    else:
+        from emaviz.views.export import export  # rerun and the report's figures take half a second of the app's start
+
+        export(found, path, configuration)
     return path
 
 

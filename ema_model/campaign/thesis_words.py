@@ -1,4 +1,4 @@
-"""The thesis's evaluation beside ours, in the tables that a terminal, a report and a recording show."""
+"""The thesis's evaluation beside ours in words: sentences, and the tables that a terminal and a report show."""
 
 from __future__ import annotations
 
@@ -16,9 +16,16 @@ from ema_model.campaign.thesis import (
     Spread,
 )
 from ema_model.identification.run import ROBUST
+from ema_model.text import Document, Lines, Table
 
 NONE = "–"
 NAMES = {**ALGORITHMS, ROBUST: "Robust"}
+
+
+def document_of(of: Evaluation) -> Document:
+    """The short table, and what it says."""
+    (first, *heads), rows = short_table(of)
+    return Document([Table(heads, rows, first), Lines(answer(of))])
 
 
 def spread(one: Spread | None, digits: int = 2) -> str:

@@ -9,6 +9,7 @@ import pytest
 from scipy.signal import lfilter
 
 from ema_model.discovery.uncertainty import colour
+from ema_model.estimation.model_fit import Data
 
 RANDOM = np.random.default_rng(5)
 N = 8000
@@ -21,7 +22,7 @@ def data_of(signals=("current_A",), windows=2):
         )
         for i in range(windows)
     ]
-    return SimpleNamespace(signals=dict.fromkeys(signals, 1.0)), SimpleNamespace(windows=shown)
+    return Data((), None, (), dict.fromkeys(signals, 1.0)), SimpleNamespace(windows=shown)
 
 
 def test_at_the_floor_each_value_counts():

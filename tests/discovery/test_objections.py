@@ -12,6 +12,7 @@ from ema_model.discovery import objections
 from ema_model.discovery.objections import disagreement
 from ema_model.effects import find
 from ema_model.estimation import Calibrated
+from ema_model.estimation.model_fit import Data
 from ema_model.quantities.axes import ROTARY
 
 RANDOM = np.random.default_rng(7)
@@ -48,7 +49,7 @@ def fitted(amplitudes, noise=1.0, settings=None, at_bound=False, path=PATH):
     return Fit(plant=SimpleNamespace(windows=windows), residual=residual, calibration=calibration, actuator=actuator)
 
 
-DATA = SimpleNamespace(signals={"current_A": 1.0}, measurements=[{"current_A": 0}] * 2)
+DATA = Data([{"current_A": 0}] * 2, None, (), {"current_A": 1.0})
 
 
 def test_recordings_that_agree_let_an_effect_be():

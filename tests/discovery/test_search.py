@@ -142,7 +142,9 @@ def test_what_promises_more_than_the_refitted_is_refitted_too(monkeypatch, again
     monkeypatch.setattr(
         search,
         "fits",
-        lambda job, chosen, tell: [SimpleNamespace(fit=one.candidate.name, candidate=one.candidate) for one in chosen],
+        lambda job, chosen, tell: [
+            SimpleNamespace(fit=one.candidate.name, candidate=one.candidate, faults=("k1",)) for one in chosen
+        ],
     )
     monkeypatch.setattr(search, "evidence_of_fit", lambda data, held, fit, noise: Evident(real[fit], 0.0, 0.0))
     monkeypatch.setattr(search, "within_band", lambda data, found: is_within)
@@ -270,3 +272,52 @@ def test_no_second_effect_is_named_beside_one_of_the_drive(hidden, settings, fal
     found = _found({hidden: settings}, among=(hidden, false))
     assert [one.name for one in found.effects] == [hidden] and not found.faults
     assert found.ladder[-1].rmse < 1.1 and found.ladder[-1].holdout_rmse < 1.2
+
+
+@pytest.mark.parametrize(
+    ("left", "recordings", "stays"),
+    [(16.0, 2, False), (16.0, 60, True), (1.5, 2, True), (1.0, 1, True)],
+    ids=["5 % of a large rest", "the same of sixty recordings", "ten times what is left", "what is left is the floor"],
+)
+def test_an_effect_that_tells_little_beside_what_is_left_is_taken_back(monkeypatch, left, recordings, stays):
+    """However long it was recorded: what a model lacks is no noise that is drawn anew with each sample."""
+    one = SimpleNamespace(
+        name="cogging_torque", rmse_before=16.4, rmse_after=16.0, holdout_before=None, holdout_after=None
+    )
+    if left < 2.0:
+        one.rmse_before, one.rmse_after = 5.0, left
+    data = SimpleNamespace(measurements=[None] * recordings, floor_spread=0.03)
+    story = SimpleNamespace(
+        added=(one,), refused={}, data=data, held=None, ladder=[SimpleNamespace(rmse=left, holdout_rmse=None)]
+    )
+    of = search.Search(story)
+    monkeypatch.setattr(of, "_round", lambda: SimpleNamespace(prior=-4.6))
+    taken = []
+    monkeypatch.setattr(of, "_take_back", lambda effect, reason: taken.append(effect))
+    assert of._slight() != stays
+    assert bool(taken) != stays
+
+
+def test_what_a_richer_law_begins_with_is_refitted_beside_it(monkeypatch):
+    """Friction that saturates at once is dry friction, which the algebra may hold for less."""
+    gains = {"saturating_friction": 30.0, "dry_friction": 8.0, "cogging_torque": 7.0}
+    terms = [
+        SimpleNamespace(
+            term=SimpleNamespace(fingerprint=object(), log_share=0.0), gain=g, candidate=SimpleNamespace(name=n)
+        )
+        for n, g in gains.items()
+    ]
+    story = SimpleNamespace(added=(), data=None, held=None, current=None, refused={})
+    of = search.Search(story)
+    monkeypatch.setattr(of, "_round", lambda: search.Round(None, None, Evident(0.0, 0.0, 0.0), (), terms))
+    monkeypatch.setattr(of, "_is_far", lambda: False)
+    monkeypatch.setattr(
+        of, "_refits", lambda chosen: [search.Contender(_trial(one), one.gain, 0.0, 0.0) for one in chosen]
+    )
+    monkeypatch.setattr(search, "within_band", lambda data, found: False)
+    monkeypatch.setattr(of, "_spoken_against", lambda one: "")
+    assert [one.trial.candidate.name for one in of._contenders()] == ["saturating_friction", "dry_friction"]
+
+
+def _trial(one):
+    return SimpleNamespace(candidate=one.candidate, faults=())

@@ -68,7 +68,8 @@ def fall(look: Look, one: Candidate) -> str:
     before, after = number(look.rmse), number(look.predicted_rmse(one))
     if before == after:
         return "explains a part, but hardly reduces the error by itself"
-    return f"error {before} → ≈ {after} × floor"
+    known = look.assessment is not None and one.name in look.assessment.refitted
+    return f"error {before} → {after} × floor, refitted" if known else f"error {before} → ≈ {after} × floor"
 
 
 def strength(look: Look, one: Candidate) -> str:
@@ -141,6 +142,12 @@ CARDS = unescaped(
     "</style>"
 )
 _PRESS = "window.emavizPress('{}')"
+_OPENED = "emaviz-opened"  # the class of what an opened card shows
+_SEE = f"setTimeout(()=>document.querySelector('.{_OPENED}')?.scrollIntoView({{block:'center',behavior:'smooth'}}),600)"
+_MOVES = Html(
+    '<span class="emaviz-job-share" style="display:inline-block;width:60px"><i class="emaviz-job-unknown"></i></span>'
+)
+_SMALL = "opacity:.8;font-size:12px;padding-bottom:5px"
 _LEGEND = html(
     '<div style="opacity:.8;font-size:12px;padding-bottom:5px"><span style="color:{}">●</span> what the model lacks, '
     '<span style="color:{}">━</span> the candidate\'s signature: where they lie together, this is it. Bar: how '
@@ -158,6 +165,7 @@ class Cards:
         self._look: Look | None = None
         self._opened: str | None = None
         self._sketches: dict[str, Html] = {}  # of this look, by the candidate's name
+        self._slots: dict[str, int] = {}  # of the buttons, which a card keeps while refits change its place
         self._running = False
         gui = page.server.gui
         self.folder = gui.add_folder("What may be missing", visible=False)
@@ -179,28 +187,30 @@ class Cards:
         post = self._page.screen.post
         self._all.on_click(lambda _: ask(self._discovering.find_all, self._all, ""))
 
-        def add(place: int) -> None:
-            one = self._at(place)
+        def add(slot: int) -> None:
+            one = self._at(slot)
             if one is not None:
                 ask(lambda: self._discovering.add(one.name), self._all, f"Adding {in_sentence(effect_title(one.name))}")
 
-        def show(place: int) -> None:
-            one = self._at(place)
+        def show(slot: int) -> None:
+            one = self._at(slot)
             if one is not None:
                 open_card(one.name)
 
-        for place, (opens, adds) in enumerate(zip(self._opens, self._adds)):
-            opens.on_click(lambda _, place=place: post("card", lambda: show(place)))
-            adds.on_click(lambda _, place=place: add(place))
+        for slot, (opens, adds) in enumerate(zip(self._opens, self._adds)):
+            opens.on_click(lambda _, slot=slot: post("card", lambda: show(slot)))
+            adds.on_click(lambda _, slot=slot: add(slot))
 
     def busy(self, busy: bool) -> None:
-        """Whether a step runs."""
+        """Whether a step runs that a click on a card has to wait for."""
         self._running = self._all.disabled = busy
         self._draw()
 
     def show(self, look: Look | None) -> None:
         """A story as it stands."""
-        self._look, self._sketches = look, {}
+        if look is None or self._look is None or look.found is not self._look.found:
+            self._slots, self._sketches = {}, {}
+        self._look = look
         self.folder.visible = look is not None
         self._draw()
 
@@ -210,21 +220,32 @@ class Cards:
             self._opened = name
             self._draw()
 
-    def _at(self, place: int) -> Candidate | None:
+    def _at(self, slot: int) -> Candidate | None:
         shown = self._look.promising[:MOST] if self._look is not None else []
-        return shown[place] if place < len(shown) else None
+        return next((one for one in shown if self._slots.get(one.name) == slot), None)
+
+    def _take_slots(self, shown: Sequence[Candidate]) -> None:
+        names = [one.name for one in shown]
+        self._slots = {name: slot for name, slot in self._slots.items() if name in names}
+        free = iter(sorted({*range(MOST)} - {*self._slots.values()}))
+        self._slots |= {name: next(free) for name in names if name not in self._slots}
 
     def _draw(self) -> None:
         look = self._look
         if look is None:
             return
         shown = look.promising[:MOST]
+        self._take_slots(shown)
         self._all.visible = bool(shown)
         if look.assessment is None:
             told = "Scoring every effect of the library and every fault of the actuator beside the residual …"
             content = html("<div>{}</div>{}", told, WAITS)
         elif shown:
-            content = _LEGEND + joined(self._card(look, place, one) for place, one in enumerate(shown))
+            content = (
+                _LEGEND
+                + how_known(look, self._discovering.is_refining)
+                + joined(self._card(look, place, one) for place, one in enumerate(shown))
+            )
         else:
             content = html("<div>{}</div>", none_left(look))
         content = html('<div class="emaviz-cards">{}</div>', content)
@@ -234,17 +255,19 @@ class Cards:
     def _card(self, look: Look, place: int, one: Candidate) -> Html:
         if one.name not in self._sketches:
             self._sketches[one.name] = discovery.sketch(discovery.signature(look, one))
-        title, probable = effect_title(one.name), look.probability(one)
+        title, probable, slot = effect_title(one.name), look.probability(one), self._slots[one.name]
         same = look.assessment.alike.get(one.name, ()) if look.assessment else ()
         rivals = ", ".join(in_sentence(effect_title(name)) for name in same)
+        against = look.assessment.spoken_against.get(one.name, "") if look.assessment else ""
         off = Html(" disabled") if self._running else ""
+        opens = f"{_PRESS.format(id_of(self._opens[slot]))};{_SEE}"
         return html(
             '<article class="emaviz-card{}"><header><button onclick="{}" title="Its equation, cause, and what it is '
             'mistaken for">{}. {}</button><b>{} probable</b></header><i><i style="width:{:.1f}%;height:4px"></i></i>'
-            '<div>{}{}<button class="do add" onclick="{}" aria-label="Add {}"{}>+ Add</button>'
+            '<div>{}{}{}<button class="do add" onclick="{}" aria-label="Add {}"{}>+ Add</button>'
             '<button class="do" onclick="{}" aria-label="Why {}">Why?</button></div>{}</article>',
             " open" if one.name == self._opened else "",
-            _PRESS.format(id_of(self._opens[place])),
+            opens,
             place + 1,
             title,
             in_percent(probable),
@@ -254,13 +277,26 @@ class Cards:
                 for line in (explained(fall(look, one)), strength(look, one), share(look, one))
             ),
             html('<div class="alike">▲ These recordings cannot tell it from {}.</div>', rivals) if rivals else "",
-            _PRESS.format(id_of(self._adds[place])),
+            html('<div class="alike">▲ Not to be claimed: {}.</div>', against) if against else "",
+            _PRESS.format(id_of(self._adds[slot])),
             title,
             off,
-            _PRESS.format(id_of(self._opens[place])),
+            opens,
             title,
             self._sketches[one.name],
         )
+
+
+def how_known(look: Look, refining: bool) -> Html:
+    """Whether the cards are as algebra ranks them, or as refits do."""
+    assert look.assessment is not None
+    done = len(look.assessment.refitted)
+    if look.assessment.refits is not None:
+        return html('<div style="{}">Ranked by refits of the most probable; the rest by algebra.</div>', _SMALL)
+    if refining:
+        told = f"{done} refitted, more are being refitted" if done else "the most probable are being refitted"
+        return html('<div style="{}" role="status">Ranked by algebra; {} … {}</div>', _SMALL, told, _MOVES)
+    return html('<div style="{}">Ranked by algebra{}.</div>', _SMALL, f"; {done} refitted" if done else "")
 
 
 def none_left(look: Look) -> str:
@@ -438,7 +474,7 @@ def head(look: Look, one: Candidate) -> Html:
         lines.append(
             html('<span style="color:{}">▲ These recordings cannot tell it from {}.</span>', COLOURS["warning"], names)
         )
-    return boxed(joined(lines, "<br>"))
+    return html('<div class="{}">{}</div>', _OPENED, boxed(joined(lines, "<br>")))
 
 
 def about(effect: Effect, equation: bool = True) -> Html:

@@ -184,6 +184,7 @@ class Discovering:
         self._stories = SavedStories(
             self.job, self.source, self.entries, self._shown, lambda: comparing.opened, self.provenance
         )
+        self.job.began.connect(lambda _: self._shown.rest())
         self._own = OwnPreview()
         self._files = Worker("emaviz-discovery-files", comparing.on_error)
 
@@ -203,6 +204,11 @@ class Discovering:
     def running(self) -> bool:
         """Whether a step runs."""
         return self.job.running
+
+    @property
+    def is_refining(self) -> bool:
+        """Whether candidates that are known are being refitted, which gives way to a step that is asked for."""
+        return self.job.running and self._shown.is_refining
 
     def choose(self, name: str) -> None:
         """A challenge by its name, or Compare's recordings with ""; the story so far stays among the entries."""
@@ -274,12 +280,18 @@ class Discovering:
                 self.entries.current.inputs = inputs
             self.provenance.take(inputs)
             self._shown.assess(told, tell)
+            self._shown.refine(told, tell)
 
         title = "Calibrating the model" if compared is None else "Looking for what is missing"
         return self.provenance.begin(lambda: self.job.begin(title, job), inputs)
 
     def add(self, name: str) -> bool:
-        """The best of that effect, or that fault, into the model, refitted; then looks again."""
+        """The best of that effect, or that fault, into the model, refitted; then looks again.
+
+        As of every step: False while another long run goes on, refits of candidates too, which end then.
+        """
+        if self._gives_way():
+            return False
         told, look = self._seen()
         candidate = look.candidate(name)
         if candidate is None:
@@ -288,6 +300,8 @@ class Discovering:
 
     def add_own(self, effect: UserEffect, start: Mapping[str, float]) -> bool:
         """A user's own torque into the model, its parameters fitted from these values."""
+        if self._gives_way():
+            return False
         told, look = self._seen()
         if any(one.key == effect.name for one in look.added):
             raise InputError("this expression is in the model already; remove it there, or change it")
@@ -321,6 +335,8 @@ class Discovering:
 
     def add_curve(self) -> bool:
         """What is left as a torque curve over the variable that explains it best."""
+        if self._gives_way():
+            return False
         told, look = self._seen()
         story, left = told.story, look.assessment.left.explanation if look.assessment else None
         if left is None:
@@ -338,6 +354,8 @@ class Discovering:
 
     def remove(self, key: str) -> bool:
         """One of the added effects or faults out of the model again, refitted."""
+        if self._gives_way():
+            return False
         told, look = self._seen()
         if key not in look.removable:
             raise InputError(f"{quoted(key, 60)} is not in the model")
@@ -348,11 +366,14 @@ class Discovering:
             tell("measuring the new model's error")
             told.story.remove(key, smaller)
             self._shown.assess(told, tell)
+            self._shown.refine(told, tell)
 
         return self.job.begin(f"Removing {in_sentence(effect_title(key))}", job)
 
     def find_all(self) -> bool:
         """Adds all that is missing, a step after another, as `emaviz discover` does."""
+        if self._gives_way():
+            return False
         told, _ = self._seen()
 
         def job(tell: Tell) -> None:
@@ -361,7 +382,7 @@ class Discovering:
                 if self._shown.is_behind:
                     self._shown.show(told)  # a step further: the ladder grows
 
-            search(told.story, say, rounds=told.rounds)
+            search(told.story, say, rounds=told.rounds, refits=told.refits)
             self._shown.assess(told, tell)
 
         return self.job.begin("Finding all that is missing", job)
@@ -382,6 +403,8 @@ class Discovering:
 
     def suggest(self) -> bool:
         """Looks for the test that tells the best candidates apart."""
+        if self._gives_way():
+            return False
         told, _ = self._seen()
         found = undecided(told.story, told.known)
         if found is None:
@@ -409,6 +432,13 @@ class Discovering:
         if told is not None and self._shown.is_behind:
             self._shown.show(told)  # what was added before it was stopped
         return "Stopped; the model is as the ladder shows it." if told else "Stopped."
+
+    def _gives_way(self) -> bool:
+        """Whether candidates are being refitted: that is stopped, and a step begins once it has ended."""
+        refining = self.is_refining
+        if refining:
+            self.job.stop()
+        return refining
 
     def _seen(self) -> tuple[Telling, Look]:
         if self.running:

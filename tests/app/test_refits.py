@@ -2,11 +2,17 @@
 
 from __future__ import annotations
 
+import random
+import time
+
 import pytest
 from support.on_page import wait_until
 from support.rig import Rig
 
+from ema_model.discovery.preview import user_begins
+from ema_model.effects.user import parse, user_torque
 from emaviz.page.discover import candidate
+from emaviz.page.discover.candidate import reach
 
 
 @pytest.fixture(scope="module")
@@ -61,3 +67,30 @@ def test_a_step_that_is_asked_for_ends_the_refits(discovering):
     assert discovering.add("cogging_torque")
     wait_until(lambda: not discovering.running)
     assert discovering.look.removable == ["cogging_torque"]
+
+
+def test_an_own_law_begins_as_what_is_left_suggests_and_its_compilation_is_stopped_at_once(discovering):
+    while discovering.look is None or discovering.look.removable or not discovering.look.promising:
+        if discovering.look is None:
+            assert discovering.start()
+        else:
+            discovering.undo()
+        wait_until(lambda: not discovering.running)
+    text = f"-c*tanh(omega/v) + A*sin(h*theta) + {random.random():.6f}*0"  # new, so that it is compiled
+    begins = user_begins(discovering.look, parse(text))
+    speed = discovering.look.residuals.variables["motor_speed"]
+    assert begins["v"].value == pytest.approx((speed**2).mean() ** 0.5) and begins["v"].value > 10.0
+    assert 1e-3 < begins["c"].value < 0.1 and begins["c"].words == "N·m"
+    assert begins["h"].value == 14.0, "the order of the best candidate"
+    low, high = reach(begins["v"].value)
+    assert -low == high >= 5.0 * begins["v"].value
+    said = []
+    discovering.job.progressed.connect(lambda text, *_: said.append(text))
+    own = user_torque(text, {"v": (low, high)})
+    assert discovering.add_own(own, {name: one.value for name, one in begins.items()})
+    wait_until(lambda: any("compiling it" in one for one in said))
+    time.sleep(0.5)
+    asked = time.perf_counter()
+    discovering.job.stop()
+    wait_until(lambda: not discovering.running)
+    assert time.perf_counter() - asked < 1.0 and not discovering.look.removable

@@ -187,6 +187,7 @@ def runs(page: Any, app: App, _: Path) -> Iterator[str]:
     page.get_by_role("button", name="Open in Rerun, here").click()
     page.wait_for_timeout(20_000)
     yield "viewer"
+    page.get_by_text("Compute a campaign", exact=True).first.click()
     choose(page, "Plan", "comparison_quick")
     page.get_by_role("button", name="Compute", exact=True).click()
     wait_until(lambda: app.campaigns.computing.running)

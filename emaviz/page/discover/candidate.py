@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import threading
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import plotly.graph_objects as go
@@ -11,6 +11,7 @@ import viser
 
 from ema_model.actuator import Actuator
 from ema_model.discovery import Candidate
+from ema_model.discovery.preview import user_begins
 from ema_model.discovery.snapshot import Look
 from ema_model.discovery.words import effect_title, in_percent, page_of, size
 from ema_model.discovery.words import typical as typical_fault
@@ -18,6 +19,7 @@ from ema_model.discovery.words import value as as_fitted
 from ema_model.effects import Effect, find
 from ema_model.effects.effect import FAMILIES
 from ema_model.effects.user import UserEffect, user_torque
+from ema_model.effects.user.beginnings import Size
 from ema_model.effects.user.expression import FUNCTIONS, VARIABLES
 from ema_model.effects.user.torque import RANGE
 from ema_model.errors import InputError
@@ -309,9 +311,9 @@ def none_left(look: Look) -> str:
 
 # --- sliders for the parameters of a user's torque, and the ranges that they move in ----------------------------------
 
-_START = 1e-3  # N·m and the like: a torque at the motor is some thousandths
-_USUAL = 0.05  # a slider's reach, as long as nobody has set another
-_STEPS = 500
+_REACH = 50.0  # times where a parameter begins, that its slider goes, as long as nobody has set another
+_STEPS = 1000
+_LONGEST_PHASE = 3.2  # rad, of a parameter that begins at 0
 
 
 class ParameterSliders:
@@ -321,27 +323,38 @@ class ParameterSliders:
         self._page, self._moved = page, moved
         self._sliders: dict[str, Any] = {}
         self._ranges: dict[str, Any] = {}
+        self._begins: dict[str, Size] = {}
+        self._own_values: set[str] = set()  # parameters whose value somebody has set
+        self._own_ranges: set[str] = set()
         gui = page.server.gui
         self._folder = gui.add_folder("Its parameters", visible=False)
+        with self._folder:
+            self._said = add_html(gui)
         self._wide = gui.add_folder("Ranges of the parameters", visible=False, expand_by_default=False)
 
-    def list(self, names: tuple[str, ...]) -> None:
-        """These parameters; those that stay keep their values and ranges."""
-        if tuple(self._sliders) == names:
+    def list(self, begins: Mapping[str, Size]) -> None:
+        """These parameters, each from where it begins; what somebody has set stays."""
+        if self._begins == dict(begins) and [*self._sliders] == [*begins]:
             return
-        values = {name: slider.value for name, slider in self._sliders.items()}
-        ranges = {name: entry.value for name, entry in self._ranges.items()}
+        values = {name: self._sliders[name].value for name in self._own_values if name in self._sliders}
+        ranges = {name: self._ranges[name].value for name in self._own_ranges if name in self._ranges}
         for control in (*self._sliders.values(), *self._ranges.values()):
             control.remove()
-        self._sliders, self._ranges = {}, {}
-        self._folder.visible = self._wide.visible = bool(names)
-        for name in names:
-            low, high = ranges.get(name, (-_USUAL, _USUAL))
+        self._sliders, self._ranges, self._begins = {}, {}, dict(begins)
+        self._folder.visible = self._wide.visible = bool(begins)
+        told = ", ".join(f"{name} {number(one.value)} {one.words}".replace(" –", "") for name, one in begins.items())
+        self._said.content = note(f"They begin as the units and what is left suggest: {told}.") if begins else ""
+        for name, begin in begins.items():
+            value = min(max(begin.value, RANGE[0]), RANGE[1])
+            low, high = ranges.get(name, reach(value))
             with self._folder:
-                self._sliders[name] = self._slider(name, float(low), float(high), float(values.get(name, _START)))
+                self._sliders[name] = self._slider(name, float(low), float(high), float(values.get(name, value)))
             with self._wide:
                 entry = self._page.server.gui.add_vector2(
-                    f"{name} from, to", (float(low), float(high)), step=1e-4, hint="Of the slider, and of the fit"
+                    f"{name} from, to",
+                    (float(low), float(high)),
+                    step=_step(low, high),
+                    hint=f"Of the slider, and of the fit, in {begin.words}",
                 )
             entry.on_update(lambda event, name=name: event.client and self._post_range(name))
             self._ranges[name] = entry
@@ -354,17 +367,20 @@ class ParameterSliders:
     @property
     def ranges(self) -> dict[str, tuple[float, float]]:
         """Those that somebody has set: a fit keeps to them."""
-        found = {name: _range(name, entry.value) for name, entry in self._ranges.items()}
-        return {name: limits for name, limits in found.items() if limits != (-_USUAL, _USUAL)}
+        return {name: _range(name, self._ranges[name].value) for name in self._own_ranges if name in self._ranges}
 
     def _slider(self, name: str, low: float, high: float, value: float) -> Any:
-        step = float(f"{(high - low) / _STEPS:.0e}")
         value = min(max(value, low), high)
-        slider = self._page.server.gui.add_slider(
-            name, low, high, step, value, hint="What it does is drawn below; the fit begins here"
-        )
-        slider.on_update(lambda event: event.client and self._moved())
+        unit = self._begins[name].words
+        hint = f"In {unit}. What it does is drawn below; the fit begins here"
+        slider = self._page.server.gui.add_slider(name, low, high, _step(low, high), value, hint=hint)
+        slider.precision = 7
+        slider.on_update(lambda event: event.client and self._set(name))
         return slider
+
+    def _set(self, name: str) -> None:
+        self._own_values.add(name)
+        self._moved()
 
     def _post_range(self, name: str) -> None:
         def take() -> None:
@@ -374,13 +390,25 @@ class ParameterSliders:
 
     def _take_range(self, name: str) -> None:
         low, high = _range(name, self._ranges[name].value)
+        self._own_ranges.add(name)
         slider = self._sliders[name]
         with self._page.server.atomic():
             slider.min, slider.max = low, high
-            slider.step = float(f"{(high - low) / _STEPS:.0e}")
+            slider.step = _step(low, high)
             slider.precision = 7
             slider.value = min(max(float(slider.value), low), high)
         self._moved()
+
+
+def reach(value: float) -> tuple[float, float]:
+    """A slider's ends about where a parameter begins, as round numbers."""
+    most = float(f"{_REACH * abs(value):.0e}") if value else _LONGEST_PHASE
+    most = min(max(most, 1e-6), RANGE[1])
+    return -most, most
+
+
+def _step(low: float, high: float) -> float:
+    return float(f"{(high - low) / _STEPS:.0e}")
 
 
 def _range(name: str, limits: Any) -> tuple[float, float]:
@@ -584,6 +612,7 @@ class OwnEffect:
         if changed:
             self._hide("")
             if look is not None and look.assessment is not None and not self._is_in(look):
+                self._list()
                 self._preview()
 
     def _is_in(self, look: Look) -> bool:
@@ -600,7 +629,7 @@ class OwnEffect:
         self._typed = typed(str(self._text.value))
         colour = COLOURS["good" if self._typed.expression else "bad"]
         self._checked.content = html('<div {}><span style="color:{}">{}</span></div>', BOX, colour, self._typed.line)
-        self._sliders.list(self._typed.expression.parameters if self._typed.expression else ())
+        self._list()
         self._hide("")
         self._enable()
         if self._timer is not None:
@@ -609,6 +638,11 @@ class OwnEffect:
             self._timer = threading.Timer(_TYPED_S, lambda: self._page.screen.post("own effect typed", self._preview))
             self._timer.daemon = True
             self._timer.start()
+
+    def _list(self) -> None:
+        """The parameters, from where what is left now suggests."""
+        found = self._typed.expression
+        self._sliders.list(user_begins(self._look, found) if found is not None and self._look is not None else {})
 
     def _effect(self) -> UserEffect:
         if self._typed.expression is None:

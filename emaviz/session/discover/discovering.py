@@ -10,6 +10,7 @@ from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ema_model.actuator import save_actuator
 from ema_model.discovery import Candidate, Story, verified
@@ -36,7 +37,9 @@ from emaviz.session.discover.history import Entries, Entry, SavedStories, Shown,
 from emaviz.session.discover.source import NOTHING, DiscoverySource, Sealing
 from emaviz.session.explore import Session
 from emaviz.session.inputs import Provenance
-from emaviz.session.jobs import Job, Signal, Tell, Worker
+from emaviz.session.jobs import Job, Signal, Tell, Worker, aside
+
+Array = NDArray[np.float64]
 
 # --- what the page hears of a discovery, besides its job --------------------------------------------------------------
 
@@ -100,16 +103,21 @@ class OwnPreview:
         """
         if look.assessment is None:
             raise InputError("one moment: the residual is still being analysed")
-        full, step = effect.settings(dict(settings)), story.steps[-1]
-        if self._room is None or self._room[0] is not step or self._room[1].name != effect.name:
-            self._room = (step, room_for(story.data, story.current, effect.name, full))
-        change = self._room[1].change(full)
+        full = effect.settings(dict(settings))
+        change = self.change(story, effect.name, full)
         if not np.all(np.isfinite(change)):
             raise InputError("with these values the torque has no value somewhere, as in a division by zero")
         signatures = {**look.assessment.signatures, effect.name: change}
         shown = replace(look, assessment=replace(look.assessment, signatures=signatures))
         candidate = Candidate(effect.name, 0.0, full)
         return Preview(shown, candidate, shown.error_with(candidate))
+
+    def change(self, story: Story, name: str, settings: Mapping[str, float]) -> Array:
+        """What a torque with these settings would change in the last model, over the floor: (values,)."""
+        step, known = story.steps[-1], self._room
+        if known is None or known[0] is not step or known[1].name != name:
+            known = self._room = (step, room_for(story.data, story.current, name, settings))
+        return known[1].change(settings)
 
 
 # --- what stays of a discovery in the data folder: the report, the recording for Rerun, the improved model ------------
@@ -187,11 +195,14 @@ class Discovering:
         self.job.began.connect(lambda _: self._shown.rest())
         self._own = OwnPreview()
         self._files = Worker("emaviz-discovery-files", comparing.on_error)
+        # a thread of their own: a new expression is compiled for seconds, in which a slider and a Stop are answered
+        self._previews = Worker("emaviz-discovery-previews", comparing.on_error)
 
     def close(self) -> None:
         """Ends the threads."""
         self.job.stop()
         self._files.close()
+        self._previews.close()
 
     # --- what is asked ----------------------------------------------------------------------------------------------
 
@@ -311,9 +322,16 @@ class Discovering:
         alike = look.assessment.alike.get(candidate.name, ()) if look.assessment else ()
 
         def job(tell: Tell) -> None:
+            is_users = candidate.name not in CATALOGUE and candidate.name not in NAMES
+            if is_users:
+                aside(
+                    lambda: self._own.change(told.story, candidate.name, candidate.settings),
+                    tell,
+                    "compiling it beside the model's effects, which takes some seconds the first time",
+                )
             tell("fitting; a combination of effects is compiled on its first use, which takes some seconds")
             trial = told.trials.of(told.story, candidate, tell)
-            if candidate.name not in CATALOGUE and candidate.name not in NAMES:
+            if is_users:
                 trial = told.trials.followed(told.story, trial, tell)
             self._shown.take(told, trial, alike, tell)
 
@@ -331,7 +349,7 @@ class Discovering:
             except (InputError, FloatingPointError) as error:
                 self.events.unpreviewed(str(error))
 
-        self.session.worker.post("own torque", job)
+        self._previews.post("own torque", job)
 
     def add_curve(self) -> bool:
         """What is left as a torque curve over the variable that explains it best."""

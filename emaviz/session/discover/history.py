@@ -31,7 +31,7 @@ from ema_model.quantities.numbers import number
 from ema_model.quantities.titles import in_sentence
 from emaviz.session.discover.source import DiscoverySource, Recipe, SavedStep, SavedStory, actuator_of, story_of
 from emaviz.session.inputs import Inputs, Provenance
-from emaviz.session.jobs import RESTED, Job, Signal, Stopped, Tell
+from emaviz.session.jobs import RESTED, Job, Signal, Stopped, Tell, aside
 
 # --- candidates refitted in the model of a story, each once -----------------------------------------------------------
 # Candidates refitted in the model of a story, each once; and the two between which a test would have to decide.
@@ -377,8 +377,7 @@ class Shown:
         """Shows the model as it is now, then what may be missing from it."""
         self.show(told)
         if not told.is_assessed:
-            tell("analysing the residual; the library of effects is compiled on its first use")
-            told.assess()
+            aside(told.assess, tell, "analysing the residual; the library of effects is compiled on its first use")
             self.show(told)
 
     def refine(self, told: Telling, tell: Tell) -> None:

@@ -256,9 +256,10 @@ def test_stop_works_and_a_session_brings_the_ladder_back(discover, app):
     wait_until(lambda: not app.discovering.running)
     page.get_by_text("Stopped;").wait_for()
     page.get_by_role("button", name="Start again").wait_for()
-    while app.discovering.look.steps > before.steps:  # with what was added before it was stopped
-        app.discovering.undo()
-        wait_until(lambda: not app.discovering.running)
+    if app.discovering.look.steps > before.steps:  # a step was whole before it was stopped
+        page.get_by_role("button", name="Start again").click()
+        done(page, app)
+        page.get_by_role("button", name="Remove Cogging torque").wait_for(state="hidden")
 
     add(page, app, "Cogging torque")
     fitted, held = errors(app)

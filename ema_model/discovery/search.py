@@ -77,14 +77,15 @@ def search(
     candidates: Sequence[str] | None = None,
     most_effects: int = NO_LIMIT,
     rounds: Rounds | None = None,
+    refits: Refits | None = None,
 ) -> Found:
     """Goes on by itself from where a story stands: adds what is missing, takes out what is not, draws what is unknown.
 
     Where a closed loop is left unexplained, inverse dynamics is asked as well, and takes over if the controller is to
     blame, or if the loop names nothing, or little of what is left.  tell is told after each step, too, and may raise
-    to stop; the story then stands at its last whole step.  rounds: those of this story that are known.
+    to stop; the story then stands at its last whole step.  rounds, refits: those of this story that are known.
     """
-    own = Search(story, candidates, most_effects, tell, rounds)
+    own = Search(story, candidates, most_effects, tell, rounds, refits)
     beside = _Beside(story, tell, candidates, most_effects)
     left = max(FAR, LOOP_TOLD * ratio(story.data, story.base))
     # A loop whose drive is another one is searched in vain; one that lacks a limit, which is not straight, tells so
@@ -230,6 +231,38 @@ class Rounds:
         return terms + [one for one in known if one.name not in names and one.name not in present]
 
 
+@dataclass(frozen=True, eq=False)
+class Refits:
+    """What refits made of the most probable Terms of a round."""
+
+    round: Round
+    contenders: list[Contender]  # the most probable first
+    spoken_against: dict[str, str]  # why what is so probable is not named, by the candidate's name
+
+    @property
+    def candidates(self) -> list[Candidate]:
+        """All of the round, the most probable first."""
+        return self.round.candidates(self.contenders, self.spoken_against)
+
+
+def refits_beside(
+    story: Story,
+    rounds: Rounds,
+    tell: Progress = lambda text: None,
+    shown: Callable[[Refits], None] = lambda so_far: None,
+) -> Refits:
+    """The most probable Terms beside the last model, refitted, as a search would begin; the story stays as it is.
+
+    shown is given those that are known, after each few.
+    """
+    apart = Story(story.data, story.held, [*story.steps])
+    seen = rounds.beside(apart, tell)
+    own = Search(apart, None, NO_LIMIT, tell, rounds, shown=lambda found: shown(Refits(seen, [*found], {})))
+    contenders = own._contenders()
+    own._named(contenders)
+    return Refits(seen, contenders, dict(apart.refused))
+
+
 class Search:
     """A story that goes on by one evidence; each of its models is looked at once."""
 
@@ -240,15 +273,18 @@ class Search:
         most_effects: int = NO_LIMIT,
         tell: Progress = lambda text: None,
         rounds: Rounds | None = None,
+        refits: Refits | None = None,
+        shown: Callable[[Sequence[Contender]], None] = lambda found: None,
     ) -> None:
-        self.story, self._tell = story, tell
+        """refits: that are known beside the story's last model; shown is given a round's contenders after each few."""
+        self.story, self._tell, self._shown = story, tell, shown
         self._names, self._most = candidates, most_effects
         self._rounds = rounds or Rounds(candidates)
         self._first: list[Candidate] = []
         self._rivals: list[Trial] = []
         self._curve: Trial | None = None
         self._going = True
-        self._refitted: tuple[Round, list[Contender]] | None = None
+        self._refitted = (refits.round, refits.contenders) if refits is not None else None
         self._objections: dict[Contender, str] = {}  # to contenders, by identity
         self._exchanges: set[tuple[str, str]] = set()  # that were tried
         self._barred: set[str] = set()  # effects that were added, and spoken against once all was there
@@ -330,6 +366,7 @@ class Search:
                 if not chosen:
                     break
                 found += self._refits(chosen)
+                self._shown(found)
                 standing = [one for one in found if self._is_beyond(one) and not self._objection(one)]
                 # What promises more than this is refitted, too.
                 best = max((one.gain for one in standing), default=-math.inf)
@@ -366,9 +403,13 @@ class Search:
 
     # --- one step -----------------------------------------------------------------------------------------------------
 
+    def _named(self, contenders: Sequence[Contender]) -> list[Contender]:
+        """Those that are far more probable than the model as it is, and that nothing speaks against."""
+        return [one for one in contenders if self._is_beyond(one) and not self._objection(one)]
+
     def _added(self) -> bool:
         story, seen, contenders = self.story, self._round(), self._contenders()
-        named = [one for one in contenders if self._is_beyond(one) and not self._objection(one)]
+        named = self._named(contenders)
         beyond = {one.trial.candidate.name for one in contenders if self._is_beyond(one)}
         if within_band(story.data, story.current):  # beside what leaves no more than a true model, nothing is missing
             beyond |= {one.candidate.name for one in seen.best if self._is_beyond(one)}

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,9 +15,10 @@ from ema_model.discovery.criteria import WORTH_A_LOOK
 from ema_model.discovery.history import Step, Story
 from ema_model.discovery.remaining import Left
 from ema_model.discovery.result import Added, Candidate, Discovery
-from ema_model.discovery.search import Rounds
+from ema_model.discovery.search import Refits, Rounds, refits_beside
 from ema_model.discovery.words import primary
 from ema_model.effects import find
+from ema_model.estimation.model_fit import floor_ratio
 from ema_model.faults import BY_NAME, causes
 from ema_model.quantities.numbers import HALF_90
 
@@ -36,9 +37,16 @@ class Assessment:
     candidates: Sequence[Candidate]
     signatures: Mapping[str, Array]  # (values,) over the floor
     alike: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+    refits: Refits | None = None  # of the most probable, once they are all known
+    refitted: Mapping[str, float] = field(default_factory=dict)  # the error with those that are refitted, in floors
+
+    @property
+    def spoken_against(self) -> Mapping[str, str]:
+        """Why what is so probable would not be named, by the candidate's name; once it is refitted."""
+        return self.refits.spoken_against if self.refits is not None else {}
 
     def probability(self, name: str) -> float:
-        """That a candidate is missing, or what looks like it, before any refit."""
+        """That a candidate is missing, or what looks like it: by algebra, or by its refit once that is known."""
         names = {name, *self.alike.get(name, ())}
         return min(1.0, sum(one.probability or 0.0 for one in self.candidates if one.name in names))
 
@@ -88,8 +96,9 @@ class Look:
         return self.assessment.probability(one.name) if self.assessment else 0.0
 
     def predicted_rmse(self, one: Candidate) -> float:
-        """The error with a candidate in the model, in floors, before any refit."""
-        return min(self.error_with(one), self.rmse)
+        """The error with a candidate in the model, in floors: as refitted, else by algebra."""
+        known = self.assessment.refitted.get(one.name) if self.assessment else None
+        return min(self.error_with(one) if known is None else known, self.rmse)
 
     def error_with(self, one: Candidate) -> float:
         """The same of a candidate that may make it worse."""
@@ -154,6 +163,28 @@ def assessed(story: Story, rounds: Rounds | None = None) -> Assessment:
     changes = {one.candidate.name: one.change for one in seen.best if one.change is not None}
     worth = {one.name for one in candidates if not one.obstacle and one.predicted_drop > _RIVAL}
     return Assessment(left, candidates, changes, _alike({name: its for name, its in changes.items() if name in worth}))
+
+
+def refined(
+    story: Story,
+    seen: Assessment,
+    rounds: Rounds,
+    tell: Callable[[str], None],
+    shown: Callable[[Assessment], None],
+) -> Assessment:
+    """What the last model of a story leaves, once the most probable candidates are refitted.
+
+    shown is given it as it stands after each few of them; tell may raise to stop.
+    """
+
+    def with_refits(found: Refits) -> Assessment:
+        data = story.data
+        fits = {one.trial.candidate.name: one.trial.fit for one in found.contenders}
+        errors = {name: floor_ratio(data, one.plant, one.calibration.signals) for name, one in fits.items()}
+        return replace(seen, candidates=found.candidates, refitted=errors)
+
+    found = refits_beside(story, rounds, tell, lambda so_far: shown(with_refits(so_far)))
+    return replace(with_refits(found), refits=found)
 
 
 def _alike(signatures: Mapping[str, Array]) -> dict[str, tuple[str, ...]]:

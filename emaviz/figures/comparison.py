@@ -638,7 +638,7 @@ def mapped_columns(every: Sequence[Lines], window_s: Window | None = None) -> tu
                 "yanchor": "bottom",
                 "xanchor": "left",
                 "showarrow": False,
-                "font": {"size": 12},
+                "font": {"size": 12, "color": LIGHT.ink},
             }
         )
     chart.update_yaxes(nticks=4, gridcolor="#86868640", zeroline=False, tickfont={"size": 10})
@@ -648,6 +648,7 @@ def mapped_columns(every: Sequence[Lines], window_s: Window | None = None) -> tu
     chart.update_layout(
         annotations=titles,
         showlegend=False,
+        font={"color": LIGHT.ink},
         margin={"l": 52, "r": 12, "t": 24, "b": 36},
         paper_bgcolor="rgba(0,0,0,0)",
         plot_bgcolor="rgba(0,0,0,0)",

@@ -37,6 +37,9 @@ def page() -> Html:
         "[data-dock-region=left] [data-dock-tab]{padding-left:2px!important;padding-right:2px!important;"
         "font-size:11px!important}[data-dock-region=left] [data-dock-tab] *{font-size:inherit!important}"
         "[data-dock-region=left] [data-dock-tab] > div:has(svg){display:none!important}"
+        # a panel scrolls up and down alone: what stands in it is as wide as it
+        "[data-dock-region=left] .mantine-ScrollArea-content{display:block!important;min-width:0!important;"
+        "max-width:100%}[data-dock-region=left] .js-plotly-plot{max-width:100%}"
         # tabs stay in sight where what is below them scrolls
         ".mantine-ScrollArea-content [data-dock-area],[data-dock-region=left] .mantine-ScrollArea-content "
         "div:has(> div > div > div > [data-dock-area]){overflow:clip!important}"

@@ -475,6 +475,23 @@ class Run:
 Work = Callable[[Run], object]
 
 
+_LOOK_AT_S = 0.1
+
+
+def aside(work: Callable[[], Done], tell: Tell, text: str) -> Done:
+    """What work comes to, done on a thread of its own while the compute thread says text, and ends once it is stopped.
+
+    For work that has no moment to ask whether it shall end, as a compilation: it goes on unheard then.
+    """
+    steps = elsewhere(work, "emaviz-aside", _LOOK_AT_S)
+    while True:
+        tell(text)
+        try:
+            next(steps)
+        except StopIteration as done:
+            return done.value
+
+
 class Job:
     """Runs work(run), where run(text) says what goes on, lets the sliders be answered, and ends it once stopped.
 

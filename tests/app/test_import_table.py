@@ -9,6 +9,7 @@ from support.on_page import choose, wait_until
 
 from ema_model.errors import InputError
 from ema_model.recordings import ColumnMapping, MappedColumn
+from emaviz.figures.theme import LIGHT
 from emaviz.page.compare.columns import Edit, done, drawing, table
 from emaviz.page.compare.tab import CompareTab
 from emaviz.session.files import Opened
@@ -105,6 +106,12 @@ def test_columns_are_drawn_edited_and_used_in_one_table(page, app):
     assert shown[0] is not None and step.mapping == before
     app.screen.post("comparison", app.tab(CompareTab).result.clear)
     app.screen.post("columns", step.redraw)
+    figure = app.tab(CompareTab).result._preview.figure
+    inks = {one.font.color for one in figure.layout.annotations} | {figure.layout.font.color}
+    assert inks == {LIGHT.ink}, "which a dark page draws in its own"
     page.get_by_role("button", name="Use these columns").click()
     wait_until(lambda: app.comparing.opened["rig.csv"].measurement is not None)
     app.comparing.job.stop()
+    app.comparing.remove("rig.csv")
+    page.get_by_text("Nothing is compared yet").wait_for()
+    page.locator(".emaviz-map").wait_for(state="hidden")

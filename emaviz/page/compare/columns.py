@@ -71,7 +71,8 @@ _STYLE = unescaped(
     ".emaviz-map input{width:64px}"
     ".emaviz-map button{font:inherit;color:inherit;background:none;border:1px solid rgba(134,142,150,.6);"
     "border-radius:4px;height:26px;min-width:32px;cursor:pointer}"
-    ".emaviz-map [data-do=plot]{padding:0;border:0;height:34px;width:220px;text-align:left;color:#2f6fde}"
+    ".emaviz-map [data-do=plot]{padding:0;border:0;height:34px;width:220px;text-align:left;"
+    "color:var(--mantine-primary-color-light-color,#2f6fde)}"
     f"@media(max-width:{TWO_COLUMNS_PX - 1}px){{.emaviz-map .why{{display:none}}"
     ".emaviz-map [data-do=plot]{width:120px}.emaviz-map :is(td,th){padding-left:5px;padding-right:5px}}"
     ".emaviz-map .drawn [data-do=plot]{outline:2px solid #2f6fde;outline-offset:2px}"
@@ -199,7 +200,7 @@ def _sure(entry: MappedColumn) -> Html:
     good, bad = entry.confidence >= _SURE, entry.confidence < _UNSURE
     colour = COLOURS["good"] if good else COLOURS["warning"] if bad else "inherit"
     share = f"{100.0 * entry.confidence:.0f} %"
-    said = '<b style="color:{}" title="{}">{}</b> <span class="why" style="opacity:.8">{}</span>'
+    said = '<b style="color:{};white-space:nowrap" title="{}">{}</b> <span class="why" style="opacity:.8">{}</span>'
     return html(said, colour, entry.reason, share, entry.reason)
 
 

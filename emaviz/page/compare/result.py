@@ -401,6 +401,13 @@ class ResultPanel:
             self._numbers.content = numbers(self._comparison)
             self._show_answer(True)
 
+    def forget_preview(self) -> None:
+        """The file that was shown is gone: back to the comparison, or to what the empty screen says."""
+        if self._comparison is None:
+            self.clear()
+        else:
+            self.end_preview()
+
     def clear(self) -> None:
         """Nothing is compared any more."""
         self._comparison = self._region = None

@@ -531,6 +531,10 @@ class ComparePanel:
             if name and name not in self._comparing.opened and what != OPEN:
                 self._failed(what, "", "")
         self._show(next(reversed(self._comparing.opened), None))
+        if not self._comparing.opened:
+            self._result.forget_preview()
+            if not self._comparing.running:
+                self._line.say("")
 
     def _post_show(self, name: str) -> None:
         self._page.screen.post("shown", lambda: self._show(name))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import threading
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import plotly.graph_objects as go
@@ -11,6 +11,7 @@ import viser
 
 from ema_model.actuator import Actuator
 from ema_model.discovery import Candidate
+from ema_model.discovery.preview import user_begins
 from ema_model.discovery.snapshot import Look
 from ema_model.discovery.words import effect_title, in_percent, page_of, size
 from ema_model.discovery.words import typical as typical_fault
@@ -18,6 +19,7 @@ from ema_model.discovery.words import value as as_fitted
 from ema_model.effects import Effect, find
 from ema_model.effects.effect import FAMILIES
 from ema_model.effects.user import UserEffect, user_torque
+from ema_model.effects.user.beginnings import Size
 from ema_model.effects.user.expression import FUNCTIONS, VARIABLES
 from ema_model.effects.user.torque import RANGE
 from ema_model.errors import InputError
@@ -68,7 +70,8 @@ def fall(look: Look, one: Candidate) -> str:
     before, after = number(look.rmse), number(look.predicted_rmse(one))
     if before == after:
         return "explains a part, but hardly reduces the error by itself"
-    return f"error {before} → ≈ {after} × floor"
+    known = look.assessment is not None and one.name in look.assessment.refitted
+    return f"error {before} → {after} × floor, refitted" if known else f"error {before} → ≈ {after} × floor"
 
 
 def strength(look: Look, one: Candidate) -> str:
@@ -141,6 +144,12 @@ CARDS = unescaped(
     "</style>"
 )
 _PRESS = "window.emavizPress('{}')"
+_OPENED = "emaviz-opened"  # the class of what an opened card shows
+_SEE = f"setTimeout(()=>document.querySelector('.{_OPENED}')?.scrollIntoView({{block:'center',behavior:'smooth'}}),600)"
+_MOVES = Html(
+    '<span class="emaviz-job-share" style="display:inline-block;width:60px"><i class="emaviz-job-unknown"></i></span>'
+)
+_SMALL = "opacity:.8;font-size:12px;padding-bottom:5px"
 _LEGEND = html(
     '<div style="opacity:.8;font-size:12px;padding-bottom:5px"><span style="color:{}">●</span> what the model lacks, '
     '<span style="color:{}">━</span> the candidate\'s signature: where they lie together, this is it. Bar: how '
@@ -158,6 +167,7 @@ class Cards:
         self._look: Look | None = None
         self._opened: str | None = None
         self._sketches: dict[str, Html] = {}  # of this look, by the candidate's name
+        self._slots: dict[str, int] = {}  # of the buttons, which a card keeps while refits change its place
         self._running = False
         gui = page.server.gui
         self.folder = gui.add_folder("What may be missing", visible=False)
@@ -179,28 +189,30 @@ class Cards:
         post = self._page.screen.post
         self._all.on_click(lambda _: ask(self._discovering.find_all, self._all, ""))
 
-        def add(place: int) -> None:
-            one = self._at(place)
+        def add(slot: int) -> None:
+            one = self._at(slot)
             if one is not None:
                 ask(lambda: self._discovering.add(one.name), self._all, f"Adding {in_sentence(effect_title(one.name))}")
 
-        def show(place: int) -> None:
-            one = self._at(place)
+        def show(slot: int) -> None:
+            one = self._at(slot)
             if one is not None:
                 open_card(one.name)
 
-        for place, (opens, adds) in enumerate(zip(self._opens, self._adds)):
-            opens.on_click(lambda _, place=place: post("card", lambda: show(place)))
-            adds.on_click(lambda _, place=place: add(place))
+        for slot, (opens, adds) in enumerate(zip(self._opens, self._adds)):
+            opens.on_click(lambda _, slot=slot: post("card", lambda: show(slot)))
+            adds.on_click(lambda _, slot=slot: add(slot))
 
     def busy(self, busy: bool) -> None:
-        """Whether a step runs."""
+        """Whether a step runs that a click on a card has to wait for."""
         self._running = self._all.disabled = busy
         self._draw()
 
     def show(self, look: Look | None) -> None:
         """A story as it stands."""
-        self._look, self._sketches = look, {}
+        if look is None or self._look is None or look.found is not self._look.found:
+            self._slots, self._sketches = {}, {}
+        self._look = look
         self.folder.visible = look is not None
         self._draw()
 
@@ -210,21 +222,32 @@ class Cards:
             self._opened = name
             self._draw()
 
-    def _at(self, place: int) -> Candidate | None:
+    def _at(self, slot: int) -> Candidate | None:
         shown = self._look.promising[:MOST] if self._look is not None else []
-        return shown[place] if place < len(shown) else None
+        return next((one for one in shown if self._slots.get(one.name) == slot), None)
+
+    def _take_slots(self, shown: Sequence[Candidate]) -> None:
+        names = [one.name for one in shown]
+        self._slots = {name: slot for name, slot in self._slots.items() if name in names}
+        free = iter(sorted({*range(MOST)} - {*self._slots.values()}))
+        self._slots |= {name: next(free) for name in names if name not in self._slots}
 
     def _draw(self) -> None:
         look = self._look
         if look is None:
             return
         shown = look.promising[:MOST]
+        self._take_slots(shown)
         self._all.visible = bool(shown)
         if look.assessment is None:
             told = "Scoring every effect of the library and every fault of the actuator beside the residual …"
             content = html("<div>{}</div>{}", told, WAITS)
         elif shown:
-            content = _LEGEND + joined(self._card(look, place, one) for place, one in enumerate(shown))
+            content = (
+                _LEGEND
+                + how_known(look, self._discovering.is_refining)
+                + joined(self._card(look, place, one) for place, one in enumerate(shown))
+            )
         else:
             content = html("<div>{}</div>", none_left(look))
         content = html('<div class="emaviz-cards">{}</div>', content)
@@ -234,17 +257,19 @@ class Cards:
     def _card(self, look: Look, place: int, one: Candidate) -> Html:
         if one.name not in self._sketches:
             self._sketches[one.name] = discovery.sketch(discovery.signature(look, one))
-        title, probable = effect_title(one.name), look.probability(one)
+        title, probable, slot = effect_title(one.name), look.probability(one), self._slots[one.name]
         same = look.assessment.alike.get(one.name, ()) if look.assessment else ()
         rivals = ", ".join(in_sentence(effect_title(name)) for name in same)
+        against = look.assessment.spoken_against.get(one.name, "") if look.assessment else ""
         off = Html(" disabled") if self._running else ""
+        opens = f"{_PRESS.format(id_of(self._opens[slot]))};{_SEE}"
         return html(
             '<article class="emaviz-card{}"><header><button onclick="{}" title="Its equation, cause, and what it is '
             'mistaken for">{}. {}</button><b>{} probable</b></header><i><i style="width:{:.1f}%;height:4px"></i></i>'
-            '<div>{}{}<button class="do add" onclick="{}" aria-label="Add {}"{}>+ Add</button>'
+            '<div>{}{}{}<button class="do add" onclick="{}" aria-label="Add {}"{}>+ Add</button>'
             '<button class="do" onclick="{}" aria-label="Why {}">Why?</button></div>{}</article>',
             " open" if one.name == self._opened else "",
-            _PRESS.format(id_of(self._opens[place])),
+            opens,
             place + 1,
             title,
             in_percent(probable),
@@ -254,13 +279,26 @@ class Cards:
                 for line in (explained(fall(look, one)), strength(look, one), share(look, one))
             ),
             html('<div class="alike">▲ These recordings cannot tell it from {}.</div>', rivals) if rivals else "",
-            _PRESS.format(id_of(self._adds[place])),
+            html('<div class="alike">▲ Not to be claimed: {}.</div>', against) if against else "",
+            _PRESS.format(id_of(self._adds[slot])),
             title,
             off,
-            _PRESS.format(id_of(self._opens[place])),
+            opens,
             title,
             self._sketches[one.name],
         )
+
+
+def how_known(look: Look, refining: bool) -> Html:
+    """Whether the cards are as algebra ranks them, or as refits do."""
+    assert look.assessment is not None
+    done = len(look.assessment.refitted)
+    if look.assessment.refits is not None:
+        return html('<div style="{}">Ranked by refits of the most probable; the rest by algebra.</div>', _SMALL)
+    if refining:
+        told = f"{done} refitted, more are being refitted" if done else "the most probable are being refitted"
+        return html('<div style="{}" role="status">Ranked by algebra; {} … {}</div>', _SMALL, told, _MOVES)
+    return html('<div style="{}">Ranked by algebra{}.</div>', _SMALL, f"; {done} refitted" if done else "")
 
 
 def none_left(look: Look) -> str:
@@ -273,9 +311,9 @@ def none_left(look: Look) -> str:
 
 # --- sliders for the parameters of a user's torque, and the ranges that they move in ----------------------------------
 
-_START = 1e-3  # N·m and the like: a torque at the motor is some thousandths
-_USUAL = 0.05  # a slider's reach, as long as nobody has set another
-_STEPS = 500
+_REACH = 50.0  # times where a parameter begins, that its slider goes, as long as nobody has set another
+_STEPS = 1000
+_LONGEST_PHASE = 3.2  # rad, of a parameter that begins at 0
 
 
 class ParameterSliders:
@@ -285,27 +323,38 @@ class ParameterSliders:
         self._page, self._moved = page, moved
         self._sliders: dict[str, Any] = {}
         self._ranges: dict[str, Any] = {}
+        self._begins: dict[str, Size] = {}
+        self._own_values: set[str] = set()  # parameters whose value somebody has set
+        self._own_ranges: set[str] = set()
         gui = page.server.gui
         self._folder = gui.add_folder("Its parameters", visible=False)
+        with self._folder:
+            self._said = add_html(gui)
         self._wide = gui.add_folder("Ranges of the parameters", visible=False, expand_by_default=False)
 
-    def list(self, names: tuple[str, ...]) -> None:
-        """These parameters; those that stay keep their values and ranges."""
-        if tuple(self._sliders) == names:
+    def list(self, begins: Mapping[str, Size]) -> None:
+        """These parameters, each from where it begins; what somebody has set stays."""
+        if self._begins == dict(begins) and [*self._sliders] == [*begins]:
             return
-        values = {name: slider.value for name, slider in self._sliders.items()}
-        ranges = {name: entry.value for name, entry in self._ranges.items()}
+        values = {name: self._sliders[name].value for name in self._own_values if name in self._sliders}
+        ranges = {name: self._ranges[name].value for name in self._own_ranges if name in self._ranges}
         for control in (*self._sliders.values(), *self._ranges.values()):
             control.remove()
-        self._sliders, self._ranges = {}, {}
-        self._folder.visible = self._wide.visible = bool(names)
-        for name in names:
-            low, high = ranges.get(name, (-_USUAL, _USUAL))
+        self._sliders, self._ranges, self._begins = {}, {}, dict(begins)
+        self._folder.visible = self._wide.visible = bool(begins)
+        told = ", ".join(f"{name} {number(one.value)} {one.words}".replace(" –", "") for name, one in begins.items())
+        self._said.content = note(f"They begin as the units and what is left suggest: {told}.") if begins else ""
+        for name, begin in begins.items():
+            value = min(max(begin.value, RANGE[0]), RANGE[1])
+            low, high = ranges.get(name, reach(value))
             with self._folder:
-                self._sliders[name] = self._slider(name, float(low), float(high), float(values.get(name, _START)))
+                self._sliders[name] = self._slider(name, float(low), float(high), float(values.get(name, value)))
             with self._wide:
                 entry = self._page.server.gui.add_vector2(
-                    f"{name} from, to", (float(low), float(high)), step=1e-4, hint="Of the slider, and of the fit"
+                    f"{name} from, to",
+                    (float(low), float(high)),
+                    step=_step(low, high),
+                    hint=f"Of the slider, and of the fit, in {begin.words}",
                 )
             entry.on_update(lambda event, name=name: event.client and self._post_range(name))
             self._ranges[name] = entry
@@ -318,17 +367,20 @@ class ParameterSliders:
     @property
     def ranges(self) -> dict[str, tuple[float, float]]:
         """Those that somebody has set: a fit keeps to them."""
-        found = {name: _range(name, entry.value) for name, entry in self._ranges.items()}
-        return {name: limits for name, limits in found.items() if limits != (-_USUAL, _USUAL)}
+        return {name: _range(name, self._ranges[name].value) for name in self._own_ranges if name in self._ranges}
 
     def _slider(self, name: str, low: float, high: float, value: float) -> Any:
-        step = float(f"{(high - low) / _STEPS:.0e}")
         value = min(max(value, low), high)
-        slider = self._page.server.gui.add_slider(
-            name, low, high, step, value, hint="What it does is drawn below; the fit begins here"
-        )
-        slider.on_update(lambda event: event.client and self._moved())
+        unit = self._begins[name].words
+        hint = f"In {unit}. What it does is drawn below; the fit begins here"
+        slider = self._page.server.gui.add_slider(name, low, high, _step(low, high), value, hint=hint)
+        slider.precision = 7
+        slider.on_update(lambda event: event.client and self._set(name))
         return slider
+
+    def _set(self, name: str) -> None:
+        self._own_values.add(name)
+        self._moved()
 
     def _post_range(self, name: str) -> None:
         def take() -> None:
@@ -338,13 +390,25 @@ class ParameterSliders:
 
     def _take_range(self, name: str) -> None:
         low, high = _range(name, self._ranges[name].value)
+        self._own_ranges.add(name)
         slider = self._sliders[name]
         with self._page.server.atomic():
             slider.min, slider.max = low, high
-            slider.step = float(f"{(high - low) / _STEPS:.0e}")
+            slider.step = _step(low, high)
             slider.precision = 7
             slider.value = min(max(float(slider.value), low), high)
         self._moved()
+
+
+def reach(value: float) -> tuple[float, float]:
+    """A slider's ends about where a parameter begins, as round numbers."""
+    most = float(f"{_REACH * abs(value):.0e}") if value else _LONGEST_PHASE
+    most = min(max(most, 1e-6), RANGE[1])
+    return -most, most
+
+
+def _step(low: float, high: float) -> float:
+    return float(f"{(high - low) / _STEPS:.0e}")
 
 
 def _range(name: str, limits: Any) -> tuple[float, float]:
@@ -438,7 +502,7 @@ def head(look: Look, one: Candidate) -> Html:
         lines.append(
             html('<span style="color:{}">▲ These recordings cannot tell it from {}.</span>', COLOURS["warning"], names)
         )
-    return boxed(joined(lines, "<br>"))
+    return html('<div class="{}">{}</div>', _OPENED, boxed(joined(lines, "<br>")))
 
 
 def about(effect: Effect, equation: bool = True) -> Html:
@@ -548,6 +612,7 @@ class OwnEffect:
         if changed:
             self._hide("")
             if look is not None and look.assessment is not None and not self._is_in(look):
+                self._list()
                 self._preview()
 
     def _is_in(self, look: Look) -> bool:
@@ -564,7 +629,7 @@ class OwnEffect:
         self._typed = typed(str(self._text.value))
         colour = COLOURS["good" if self._typed.expression else "bad"]
         self._checked.content = html('<div {}><span style="color:{}">{}</span></div>', BOX, colour, self._typed.line)
-        self._sliders.list(self._typed.expression.parameters if self._typed.expression else ())
+        self._list()
         self._hide("")
         self._enable()
         if self._timer is not None:
@@ -573,6 +638,11 @@ class OwnEffect:
             self._timer = threading.Timer(_TYPED_S, lambda: self._page.screen.post("own effect typed", self._preview))
             self._timer.daemon = True
             self._timer.start()
+
+    def _list(self) -> None:
+        """The parameters, from where what is left now suggests."""
+        found = self._typed.expression
+        self._sliders.list(user_begins(self._look, found) if found is not None and self._look is not None else {})
 
     def _effect(self) -> UserEffect:
         if self._typed.expression is None:

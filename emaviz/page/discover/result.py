@@ -242,6 +242,7 @@ class DiscoveryPanel:
         add_html(gui, CARDS)
         self._headline = add_html(gui, self._empty)
         self.beside = SideBySide(page)
+        self._effect = EffectView(page, discovering)  # below the sentence, in one column too
         add_html(gui, PLOTS_EARLY)
         self._keep_folder = gui.add_folder("Keep it", visible=False)
         with self._keep_folder:  # where it is seen without scrolling
@@ -249,7 +250,6 @@ class DiscoveryPanel:
             leads()
         self._ladder: Any = gui.add_plotly(go.Figure(), config=CONFIG, visible=False)
         page.workspaces.heights.set_figure(self._ladder, *_LADDER_PX)
-        self._effect = EffectView(page, discovering)
         self._truth_folder = gui.add_folder("The challenge's truth", visible=False)
         with self._truth_folder:
             self._reveal = gui.add_button("Reveal the truth", icon=viser.Icon.EYE, color="gray")

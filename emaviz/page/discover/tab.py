@@ -490,14 +490,19 @@ class DiscoverPanel:
         with self._page.server.atomic():
             self._show_start(busy)
             self._start.visible = not busy
-            for control in (self._undo, *self._removes):
-                control.disabled = busy
+            self._undo.disabled = busy
             self.source.busy(busy)
             self._entries.busy(busy)
             if self._look is not None and not busy:
                 self._undo.disabled = self._look.steps < 2
-            self._own.busy(busy)
-            self._result.busy(busy)
+            self._wait(busy)
+
+    def _wait(self, busy: bool) -> None:
+        """Whether a step runs that does not give way to another."""
+        self._own.busy(busy)
+        self._result.busy(busy)
+        for control in self._removes:
+            control.disabled = busy
 
     def _ended(self) -> None:
         self._busy(False)
@@ -515,6 +520,8 @@ class DiscoverPanel:
             self._draw_cards(look)
             self._own.show(look)
             self._result.show(look)
+            if self._discovering.is_refining:
+                self._wait(False)
             if self._opened is None:
                 self._result.open(None)
             else:

@@ -308,9 +308,9 @@ class IdentifyResult:
             self._swarm = SwarmView(page)
         with panel.add_tab(_ANSWER, viser.Icon.TARGET_ARROW):
             standing.add(gui)
+            self._sure = add_html(gui)  # the sentence first
             self._whose = gui.add_dropdown("Algorithm shown", (_BEST, *ALGORITHMS.values()))
             self._bars = add_html(gui, fault_bars(HEALTHY, page.session.actuator))
-            self._sure = add_html(gui)
             self._try = gui.add_button(
                 "Set that command in Explore",
                 icon=viser.Icon.ADJUSTMENTS,

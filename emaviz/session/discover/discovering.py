@@ -10,6 +10,7 @@ from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ema_model.actuator import save_actuator
 from ema_model.discovery import Candidate, Story, verified
@@ -36,7 +37,9 @@ from emaviz.session.discover.history import Entries, Entry, SavedStories, Shown,
 from emaviz.session.discover.source import NOTHING, DiscoverySource, Sealing
 from emaviz.session.explore import Session
 from emaviz.session.inputs import Provenance
-from emaviz.session.jobs import Job, Signal, Tell, Worker
+from emaviz.session.jobs import Job, Signal, Tell, Worker, aside
+
+Array = NDArray[np.float64]
 
 # --- what the page hears of a discovery, besides its job --------------------------------------------------------------
 
@@ -100,16 +103,21 @@ class OwnPreview:
         """
         if look.assessment is None:
             raise InputError("one moment: the residual is still being analysed")
-        full, step = effect.settings(dict(settings)), story.steps[-1]
-        if self._room is None or self._room[0] is not step or self._room[1].name != effect.name:
-            self._room = (step, room_for(story.data, story.current, effect.name, full))
-        change = self._room[1].change(full)
+        full = effect.settings(dict(settings))
+        change = self.change(story, effect.name, full)
         if not np.all(np.isfinite(change)):
             raise InputError("with these values the torque has no value somewhere, as in a division by zero")
         signatures = {**look.assessment.signatures, effect.name: change}
         shown = replace(look, assessment=replace(look.assessment, signatures=signatures))
         candidate = Candidate(effect.name, 0.0, full)
         return Preview(shown, candidate, shown.error_with(candidate))
+
+    def change(self, story: Story, name: str, settings: Mapping[str, float]) -> Array:
+        """What a torque with these settings would change in the last model, over the floor: (values,)."""
+        step, known = story.steps[-1], self._room
+        if known is None or known[0] is not step or known[1].name != name:
+            known = self._room = (step, room_for(story.data, story.current, name, settings))
+        return known[1].change(settings)
 
 
 # --- what stays of a discovery in the data folder: the report, the recording for Rerun, the improved model ------------
@@ -179,13 +187,17 @@ class Discovering:
         self._stories = SavedStories(
             self.job, self.source, self.entries, self._shown, lambda: comparing.opened, self.provenance
         )
+        self.job.began.connect(lambda _: self._shown.rest())
         self._own = OwnPreview()
         self._files = Worker("emaviz-discovery-files", comparing.on_error)
+        # a thread of their own: a new expression is compiled for seconds, in which a slider and a Stop are answered
+        self._previews = Worker("emaviz-discovery-previews", comparing.on_error)
 
     def close(self) -> None:
         """Ends the threads."""
         self.job.stop()
         self._files.close()
+        self._previews.close()
 
     # --- what is asked ----------------------------------------------------------------------------------------------
 
@@ -198,6 +210,11 @@ class Discovering:
     def running(self) -> bool:
         """Whether a step runs."""
         return self.job.running
+
+    @property
+    def is_refining(self) -> bool:
+        """Whether candidates that are known are being refitted, which gives way to a step that is asked for."""
+        return self.job.running and self._shown.is_refining
 
     def choose(self, name: str) -> None:
         """A challenge by its name, or Compare's recordings with ""; the story so far stays among the entries."""
@@ -269,12 +286,18 @@ class Discovering:
                 self.entries.current.inputs = inputs
             self.provenance.take(inputs)
             self._shown.assess(told, tell)
+            self._shown.refine(told, tell)
 
         title = "Calibrating the model" if compared is None else "Looking for what is missing"
         return self.provenance.begin(lambda: self.job.begin(title, job), inputs)
 
     def add(self, name: str) -> bool:
-        """The best of that effect, or that fault, into the model, refitted; then looks again."""
+        """The best of that effect, or that fault, into the model, refitted; then looks again.
+
+        As of every step: False while another long run goes on, refits of candidates too, which end then.
+        """
+        if self._gives_way():
+            return False
         told, look = self._seen()
         candidate = look.candidate(name)
         if candidate is None:
@@ -283,6 +306,8 @@ class Discovering:
 
     def add_own(self, effect: UserEffect, start: Mapping[str, float]) -> bool:
         """A user's own torque into the model, its parameters fitted from these values."""
+        if self._gives_way():
+            return False
         told, look = self._seen()
         if any(one.key == effect.name for one in look.added):
             raise InputError("this expression is in the model already; remove it there, or change it")
@@ -292,9 +317,16 @@ class Discovering:
         alike = look.assessment.alike.get(candidate.name, ()) if look.assessment else ()
 
         def job(tell: Tell) -> None:
+            is_users = candidate.name not in CATALOGUE and candidate.name not in NAMES
+            if is_users:
+                aside(
+                    lambda: self._own.change(told.story, candidate.name, candidate.settings),
+                    tell,
+                    "compiling it beside the model's effects, which takes some seconds the first time",
+                )
             tell("fitting; a combination of effects is compiled on its first use, which takes some seconds")
             trial = told.trials.of(told.story, candidate, tell)
-            if candidate.name not in CATALOGUE and candidate.name not in NAMES:
+            if is_users:
                 trial = told.trials.followed(told.story, trial, tell)
             self._shown.take(told, trial, alike, tell)
 
@@ -312,10 +344,12 @@ class Discovering:
             except (InputError, FloatingPointError) as error:
                 self.events.unpreviewed(str(error))
 
-        self.session.worker.post("own torque", job)
+        self._previews.post("own torque", job)
 
     def add_curve(self) -> bool:
         """What is left as a torque curve over the variable that explains it best."""
+        if self._gives_way():
+            return False
         told, look = self._seen()
         story, left = told.story, look.assessment.left.explanation if look.assessment else None
         if left is None:
@@ -333,6 +367,8 @@ class Discovering:
 
     def remove(self, key: str) -> bool:
         """One of the added effects or faults out of the model again, refitted."""
+        if self._gives_way():
+            return False
         told, look = self._seen()
         if key not in look.removable:
             raise InputError(f"{quoted(key, 60)} is not in the model")
@@ -343,11 +379,14 @@ class Discovering:
             tell("measuring the new model's error")
             told.story.remove(key, smaller)
             self._shown.assess(told, tell)
+            self._shown.refine(told, tell)
 
         return self.job.begin(f"Removing {in_sentence(effect_title(key))}", job)
 
     def find_all(self) -> bool:
         """Adds all that is missing, a step after another, as `emaviz discover` does."""
+        if self._gives_way():
+            return False
         told, _ = self._seen()
 
         def job(tell: Tell) -> None:
@@ -356,7 +395,7 @@ class Discovering:
                 if self._shown.is_behind:
                     self._shown.show(told)  # a step further: the ladder grows
 
-            search(told.story, say, rounds=told.rounds)
+            search(told.story, say, rounds=told.rounds, refits=told.refits)
             self._shown.assess(told, tell)
 
         return self.job.begin("Finding all that is missing", job)
@@ -377,6 +416,8 @@ class Discovering:
 
     def suggest(self) -> bool:
         """Looks for the test that tells the best candidates apart."""
+        if self._gives_way():
+            return False
         told, _ = self._seen()
         found = undecided(told.story, told.known)
         if found is None:
@@ -404,6 +445,13 @@ class Discovering:
         if told is not None and self._shown.is_behind:
             self._shown.show(told)  # what was added before it was stopped
         return "Stopped; the model is as the ladder shows it." if told else "Stopped."
+
+    def _gives_way(self) -> bool:
+        """Whether candidates are being refitted: that is stopped, and a step begins once it has ended."""
+        refining = self.is_refining
+        if refining:
+            self.job.stop()
+        return refining
 
     def _seen(self) -> tuple[Telling, Look]:
         if self.running:

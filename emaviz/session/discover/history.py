@@ -20,8 +20,8 @@ from ema_model.discovery import Candidate, Story, begun, result_of
 from ema_model.discovery.history import Step
 from ema_model.discovery.refit import Trial, with_drops
 from ema_model.discovery.result import Experiment
-from ema_model.discovery.search import Rounds
-from ema_model.discovery.snapshot import Assessment, Look, assessed, known_of, look_at
+from ema_model.discovery.search import Refits, Rounds
+from ema_model.discovery.snapshot import Assessment, Look, assessed, known_of, look_at, refined
 from ema_model.discovery.words import effect_title
 from ema_model.effects import CATALOGUE, catalogue_name
 from ema_model.errors import InputError
@@ -31,7 +31,7 @@ from ema_model.quantities.numbers import number
 from ema_model.quantities.titles import in_sentence
 from emaviz.session.discover.source import DiscoverySource, Recipe, SavedStep, SavedStory, actuator_of, story_of
 from emaviz.session.inputs import Inputs, Provenance
-from emaviz.session.jobs import RESTED, Job, Signal, Stopped, Tell
+from emaviz.session.jobs import RESTED, Job, Signal, Stopped, Tell, aside
 
 # --- candidates refitted in the model of a story, each once -----------------------------------------------------------
 # Candidates refitted in the model of a story, each once; and the two between which a test would have to decide.
@@ -52,6 +52,10 @@ class Trials:
         if known is None or known.candidate.settings != candidate.settings:
             known = self._known[key] = story.trial(candidate, tell)
         return known
+
+    def take(self, story: Story, trials: Sequence[Trial]) -> None:
+        """Those of the last model that are known."""
+        self._known |= {(story.steps[-1], one.candidate.name): one for one in trials}
 
     def followed(self, story: Story, trial: Trial, tell: Tell) -> Trial:
         """A user's effect, fitted again from where its parameters went to a bound: their scale is the user's guess."""
@@ -193,6 +197,22 @@ class Telling:
         found = self.known[self.story.steps[-1]] = assessed(self.story, self.rounds)
         self.first = self.first or found.candidates
 
+    @property
+    def refits(self) -> Refits | None:
+        """Beside the last model, once they are known."""
+        known = known_of(self.story.steps[-1], self.known)
+        return known.refits if known is not None else None
+
+    def refine(self, tell: Tell, shown: Callable[[Assessment], None]) -> None:
+        """Refits the most probable candidates; shown is given what is known after each few."""
+        step = self.story.steps[-1]
+        seen = known_of(step, self.known)
+        assert seen is not None, "it is assessed before"
+        found = self.known[step] = refined(self.story, seen, self.rounds, tell, shown)
+        assert found.refits is not None
+        self.trials.take(self.story, [one.trial for one in found.refits.contenders])
+        shown(found)
+
     def add(self, trial: Trial, alike: Sequence[str], tell: Tell) -> None:
         """Takes a trial for the next model, fitted to its end; alike: what cannot be told from it."""
         known = known_of(self.story.steps[-1], self.known)
@@ -318,6 +338,7 @@ class Shown:
         """looked: told each picture."""
         self.told: Telling | None = None
         self.look: Look | None = None
+        self.is_refining = False  # the last run has scored the candidates, and refits some of them at its end
         self._source, self._entries, self._looked = source, entries, looked
 
     @property
@@ -350,21 +371,38 @@ class Shown:
         tell("measuring the new model's error")  # the last moment to stop
         told.add(trial, alike, tell)
         self.assess(told, tell)
+        self.refine(told, tell)
 
     def assess(self, told: Telling, tell: Tell) -> None:
         """Shows the model as it is now, then what may be missing from it."""
         self.show(told)
         if not told.is_assessed:
-            tell("analysing the residual; the library of effects is compiled on its first use")
-            told.assess()
+            aside(told.assess, tell, "analysing the residual; the library of effects is compiled on its first use")
             self.show(told)
+
+    def refine(self, told: Telling, tell: Tell) -> None:
+        """Refits the most probable candidates, and shows each as it comes; what they stand beside is shown before."""
+        look = self.look
+        if told.refits is not None or look is None or not look.promising:
+            return
+        self.is_refining = True
+        self._looked(look)  # a click may follow from now on
+        tell("refitting the most probable candidates")
+        told.refine(tell, lambda known: self._take(replace(look, assessment=known)))
+
+    def rest(self) -> None:
+        """Another run begins."""
+        self.is_refining = False
 
     def show(self, told: Telling) -> None:
         """A new picture."""
-        self.look = told.look()
+        self._take(told.look())
+
+    def _take(self, look: Look) -> None:
+        self.look = look
         if self._entries.current is not None:
-            self._entries.current.look = self.look
-        self._looked(self.look)
+            self._entries.current.look = look
+        self._looked(look)
 
 
 # --- the discoveries in a session's file: what it is given, and what it brings, taken again step by step --------------
@@ -454,6 +492,7 @@ class SavedStories:
             self._again, entry.inputs = None, inputs
             self._provenance.take(inputs)
             shown.assess(told, tell)
+            shown.refine(told, tell)
 
         wanted, until = {*saved.recipe.fitted, *saved.recipe.held}, time.perf_counter() + _MOST_WAIT_S
 

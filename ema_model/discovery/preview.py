@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
@@ -11,17 +10,11 @@ from numpy.typing import NDArray
 from scipy.optimize import lsq_linear
 
 from ema_model.actuator import Actuator
-from ema_model.comparison.residuals import Residuals
-from ema_model.discovery.snapshot import Look
-from ema_model.effects.user import Expression
-from ema_model.effects.user.beginnings import Size, beginnings
 from ema_model.estimation.model_fit import Data, Fit
 from ema_model.models import Model
 
 Array = NDArray[np.float64]
 
-_VARIABLES = {"t": "time", "theta": "motor_angle", "omega": "motor_speed", "q": "current", "user": "user_position"}
-_USUAL_NM = 1e-3  # at a motor's shaft, where it cannot be said how much is left
 _LEAST = 1e-9  # σ, so that a parameter at its bound has some room
 
 
@@ -68,29 +61,6 @@ def preview(data: Data, found: Fit, name: str, settings: Mapping[str, float]) ->
     basis, triangle = np.linalg.qr(jacobian)
     plant = data.plant(_with(calibration.actuator, name, settings))
     return Preview(data, found, name, plant, jacobian, basis, triangle)
-
-
-def user_begins(look: Look, expression: Expression) -> dict[str, Size]:
-    """Where a fit of a user's torque begins, for each of its parameters: as the last model's residual suggests."""
-    left = look.residuals
-    sizes = {name: _usual(left.variables[own]) for name, own in _VARIABLES.items() if own in left.variables}
-    orders = (one.settings["order"] for one in look.promising if "order" in one.settings)
-    order = next((one for one in orders if math.isfinite(one)), 1.0)
-    return beginnings(expression, _torque_left(left), sizes, order)
-
-
-def _torque_left(left: Residuals) -> float:
-    """rms, N·m: of the torque where it was measured, else of the current."""
-    if "motor_torque_Nm" in left.values:
-        return _usual(left.values["motor_torque_Nm"])
-    if "current_A" in left.values and left.torque_constant is not None:
-        return left.torque_constant * _usual(left.values["current_A"])
-    return _USUAL_NM
-
-
-def _usual(values: Array) -> float:
-    good = values[np.isfinite(values)]
-    return float(np.sqrt(np.mean(good**2))) if len(good) else 0.0
 
 
 def _with(actuator: Actuator, name: str, settings: Mapping[str, float]) -> Actuator:

@@ -18,12 +18,16 @@ from ema_model.discovery.result import Added, Candidate, Discovery
 from ema_model.discovery.search import Refits, Rounds, refits_beside
 from ema_model.discovery.words import primary
 from ema_model.effects import find
+from ema_model.effects.user import Expression
+from ema_model.effects.user.beginnings import Size, beginnings
 from ema_model.estimation.model_fit import floor_ratio
 from ema_model.faults import BY_NAME, causes
 from ema_model.quantities.numbers import HALF_90
 
 Array = NDArray[np.float64]
 
+_VARIABLES = {"t": "time", "theta": "motor_angle", "omega": "motor_speed", "q": "current", "user": "user_position"}
+_USUAL_NM = 1e-3  # at a motor's shaft, where it cannot be said how much is left
 _RIVAL = 25.0  # of χ², below which a candidate is too faint to be taken for another
 _SAME_CHI2 = 25.0  # between two of them, below which they cannot be told apart
 _SAME_DIRECTION = 1.0 - 0.98**2  # sin² between their signatures, likewise
@@ -234,3 +238,26 @@ def look_at(story: Story, found: Discovery, assessment: Assessment | None, first
         held=() if story.held is None else tuple(one.name for one in story.held.measurements),
         explained_before=first.left.explained if first is not None else (),
     )
+
+
+def user_begins(look: Look, expression: Expression) -> dict[str, Size]:
+    """Where a fit of a user's torque begins, for each of its parameters: as the last model's residual suggests."""
+    left = look.residuals
+    sizes = {name: _usual(left.variables[own]) for name, own in _VARIABLES.items() if own in left.variables}
+    orders = (one.settings["order"] for one in look.promising if "order" in one.settings)
+    order = next((one for one in orders if math.isfinite(one)), 1.0)
+    return beginnings(expression, _torque_left(left), sizes, order)
+
+
+def _torque_left(left: Residuals) -> float:
+    """rms, N·m: of the torque where it was measured, else of the current."""
+    if "motor_torque_Nm" in left.values:
+        return _usual(left.values["motor_torque_Nm"])
+    if "current_A" in left.values and left.torque_constant is not None:
+        return left.torque_constant * _usual(left.values["current_A"])
+    return _USUAL_NM
+
+
+def _usual(values: Array) -> float:
+    good = values[np.isfinite(values)]
+    return float(np.sqrt(np.mean(good**2))) if len(good) else 0.0

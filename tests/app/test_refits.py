@@ -9,7 +9,7 @@ import pytest
 from support.on_page import wait_until
 from support.rig import Rig
 
-from ema_model.discovery.preview import user_begins
+from ema_model.discovery.snapshot import user_begins
 from ema_model.effects.user import parse, user_torque
 from emaviz.page.discover import candidate
 from emaviz.page.discover.candidate import reach

@@ -11,8 +11,7 @@ import viser
 
 from ema_model.actuator import Actuator
 from ema_model.discovery import Candidate
-from ema_model.discovery.preview import user_begins
-from ema_model.discovery.snapshot import Look
+from ema_model.discovery.snapshot import Look, user_begins
 from ema_model.discovery.words import effect_title, in_percent, page_of, size
 from ema_model.discovery.words import typical as typical_fault
 from ema_model.discovery.words import value as as_fitted

@@ -335,9 +335,13 @@ class Jobs:
             self._come.clear()
 
     def _look(self) -> None:
+        goes_on = ""  # what did as the first was looked at: none behind it goes first since it ended meanwhile
         for one in sorted(self.waiting, key=lambda one: one.rests):
-            what = one.waits_for() or self._worker.goes_on
+            goes_on = goes_on or self._worker.goes_on
+            what = one.waits_for() or goes_on
             one.free = 0 if what else one.free + 1
+            if one not in self.waiting:  # it was taken off meanwhile
+                continue
             if one.free > one.rests and self._begins(one):
                 self.remove(one)
             elif one in self.waiting:

@@ -158,6 +158,7 @@ def _take(story: Story, saved: SavedStep, tell: Progress) -> None:
         story.add(trial, rivals)
     else:
         raise InputError(_DAMAGED)
+    story.finish(tell)  # as it was when it was added: the floor may be another
 
 
 def _rivals(story: Story, before: Step, step: Step) -> tuple[str, ...]:

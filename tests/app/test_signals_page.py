@@ -111,14 +111,15 @@ def click(page, chart, share):
 
 def drag(page, chart, start, end):
     """Zooms by the mouse; again where the chart was drawn anew under it, which ends a drag."""
-    left, top, width, height, *before = page.evaluate(chart)
+    before = page.evaluate(chart)[4:6]
     for _ in range(3):
+        left, top, width, height, *_ = page.evaluate(chart)  # it may have moved, too
         page.mouse.move(left + start * width, top + 0.5 * height)
         page.mouse.down()
         page.mouse.move(left + end * width, top + 0.5 * height, steps=3)
         page.mouse.up()
         with contextlib.suppress(AssertionError):
-            return wait_until(lambda: not np.allclose(page.evaluate(chart)[4:6], before[:2], atol=1e-6), 10.0)
+            return wait_until(lambda: not np.allclose(page.evaluate(chart)[4:6], before, atol=1e-6), 10.0)
     raise AssertionError("a drag does not zoom")
 
 

@@ -14,7 +14,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ema_model.actuator import Actuator
-from ema_model.actuator.parameters import WITHOUT_LOOP
 from ema_model.commands import command
 from ema_model.discovery.refit import Trial
 from ema_model.discovery.result import Experiment
@@ -25,6 +24,7 @@ from ema_model.estimation.model_fit import Data, Fit
 from ema_model.estimation.problem import SIGNALS, Problem
 from ema_model.faults import NAMES
 from ema_model.models import ClosedLoop, Model
+from ema_model.simulation.plant import can_be_explored
 from ema_model.simulation.run import Run, simulate_monitor
 
 Array = NDArray[np.float64]
@@ -44,7 +44,7 @@ def next_experiment(data: Data, one: Trial, other: Trial) -> Experiment | None:
     None where no allowed experiment does, or where the actuator cannot be simulated.
     """
     first, second, rivals = one.fit, other.fit, (one.candidate.name, other.candidate.name)
-    if first.calibration.actuator.controller.kind in WITHOUT_LOOP:
+    if not (first.plant.simulates_commands and can_be_explored(first.calibration.actuator)):
         return None
     further = [name for name in SIGNALS[2:] if name not in data.signals or not _is_measured(first, name)]
     for signals in (dict(data.signals), {**data.signals, **dict.fromkeys(further, 1.0)}):

@@ -367,7 +367,7 @@ class Search:
                     break
                 found += self._refits(chosen)
                 self._shown(found)
-                standing = [one for one in found if self._is_beyond(one) and not self._objection(one)]
+                standing = self._named(found)
                 # What promises more than this is refitted, too.
                 best = max((one.gain for one in standing), default=-math.inf)
             if standing:  # what a short travel shows of it, or a narrow range, may be all that there is

@@ -91,9 +91,7 @@ class InverseDynamics:
         moving = self._currents(rows, len(k), window, window.motion.acceleration)
         needed = window.motion.filtered(static) + moving - static + _of_loop(actuator) * window.motion.acceleration
         needed = later(needed, _each(actuator.sensors.delay_s), window.period_s, smooth=True)
-        size = window.samples_per_block
-        whole = needed.shape[1] // size
-        current = needed[:, : whole * size].reshape(len(k), whole, size).mean(axis=2)[:, window.moving]
+        current = _by_block(needed, window)
         sensors = actuator.sensors
         return {
             "current_A": _each(sensors.current_gain) * current + _each(sensors.current_bias_A),
@@ -140,10 +138,7 @@ class InverseDynamics:
         off = _ROUNDED * np.sqrt(np.maximum(window.motion.filtered(rounded**2), 0.0))
         resting = np.zeros_like(window.position)
         either = [self._currents(rows, 1, replace(window, speed=window.speed + s * off), resting) for s in (1.0, -1.0)]
-        differs = 0.5 * np.abs(window.motion.filtered(either[0] - either[1]))
-        size = window.samples_per_block
-        whole = differs.shape[1] // size
-        current = differs[0, : whole * size].reshape(whole, size).mean(axis=1)[window.moving]
+        [current] = _by_block(0.5 * np.abs(window.motion.filtered(either[0] - either[1])), window)
         return {"current_A": current, "motor_torque_Nm": actuator.motor.torque_constant_Nm_A * current}
 
     def _currents(self, rows: Array, n: int, window: Stretch, acceleration: Array) -> Array:
@@ -156,6 +151,13 @@ class InverseDynamics:
             result = needed_currents(self.stack, rows, (position, speed, faster, load, since_s), window.still)
             currents[:, part] = result.transpose(0, 2, 1).reshape(len(rows) * LANES, -1)[:n]
         return currents
+
+
+def _by_block(values: Array, window: Stretch) -> Array:
+    """Means (n, blocks) of values (n, samples), of the blocks in motion."""
+    size = window.samples_per_block
+    whole = values.shape[1] // size
+    return values[:, : whole * size].reshape(len(values), whole, size).mean(axis=2)[:, window.moving]
 
 
 def _of_loop(actuator: Actuator) -> Array:

@@ -39,7 +39,7 @@ FLOORS = {
         ["curve", "next_experiment", "objections", "terms", "words"],
         ["scoring"],
         ["history"],
-        ["begin", "contradictions"],
+        ["begin", "contradictions", "rounds"],
         ["inverse"],
         ["search"],
         ["discover", "snapshot"],

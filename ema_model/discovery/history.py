@@ -239,12 +239,12 @@ class Story:
         ]
         self.steps[-1] = replace(last, added=tuple(added))
 
-    def set_probability(self, probability: float) -> None:
-        """Says how probable it is that what was added last, or what cannot be told from it, is missing."""
+    def set_probability(self, probability: float, name: str = "") -> None:
+        """Says how probable it is that an effect, what was added last without its name, or what is alike is missing."""
         last = self.steps[-1]
-        if last.added:
-            added = (*last.added[:-1], replace(last.added[-1], probability=probability))
-            self.steps[-1] = replace(last, added=added)
+        name = name or (last.added[-1].name if last.added else "")
+        added = (replace(one, probability=probability) if one.name == name else one for one in last.added)
+        self.steps[-1] = replace(last, added=tuple(added))
 
     def without(self, key: str, tell: Progress = lambda text: None, found: Fit | None = None) -> Fit:
         """The last model, or another one that was found, without one of its effects or faults, refitted."""

@@ -177,7 +177,7 @@ def _is_held_back(found: Fit, effects: Iterable[str]) -> bool:
     for name in effects:
         for parameter in find(name, found.actuator.axes).parameters:
             one = found.calibration.parameters.get(f"effects.{name}.{parameter.name}")
-            if one is None or abs(one.z) < _HELD_BACK or parameter.name in _FOUND:
+            if one is None or parameter.name in _FOUND or (abs(one.z) < _HELD_BACK and not one.at_bound):
                 continue
             near = 0.01 * abs(one.value)
             if parameter.low + near < one.value < parameter.high - near:

@@ -70,6 +70,11 @@ def ratio(data: Data, found: Fit) -> float:
     return floor_ratio(data.before_fit, found.plant, found.calibration.signals)
 
 
+def told_ratio(data: Data, found: Fit) -> float:
+    """The error of a fit in the floors that it is told in."""
+    return floor_ratio(data, found.plant, found.calibration.signals)
+
+
 def at_floor(data: Data, found: Fit) -> bool:
     """Whether a fit leaves so little that the search takes it for the floor, before a fit takes from that."""
     return ratio(data, found) <= BAND
@@ -77,7 +82,7 @@ def at_floor(data: Data, found: Fit) -> bool:
 
 def within_band(data: Data, found: Fit) -> bool:
     """Whether a fit leaves no more than a true model does, as `compare` has it."""
-    return floor_ratio(data, found.plant, found.calibration.signals) <= most_of_floor(data.floor_spread)
+    return told_ratio(data, found) <= most_of_floor(data.floor_spread)
 
 
 def silence(data: Data, found: Fit) -> str:

@@ -8,7 +8,7 @@ is any that is far more probable than what is there.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -17,8 +17,6 @@ from ema_model.comparison.explain import Explanation
 from ema_model.comparison.verdict import most_of_floor
 from ema_model.discovery.contradictions import contradictions, goes_by_angle, put_right
 from ema_model.discovery.criteria import (
-    ANY_MISSING,
-    AS_WELL,
     FAR,
     HALF,
     LARGEST_GROUP,
@@ -32,20 +30,18 @@ from ema_model.discovery.criteria import (
 )
 from ema_model.discovery.curve import is_a_shape
 from ema_model.discovery.evidence import evidence_of, gains_of
-from ema_model.discovery.fingerprints import Fingerprint, fingerprints
 from ema_model.discovery.history import Story
 from ema_model.discovery.inverse import Opinion, compared, second_opinion, taken_over
 from ema_model.discovery.objections import implausible, unmeasured, unsteady, within
 from ema_model.discovery.observed.transmission import transmission_seen
 from ema_model.discovery.observed.two_masses import two_masses_seen
 from ema_model.discovery.refit import Trial, fitted_to_the_end, refitted
-from ema_model.discovery.remaining import at_floor, ratio, within_band
+from ema_model.discovery.remaining import at_floor, ratio, told_ratio, within_band
 from ema_model.discovery.result import Added, Candidate
-from ema_model.discovery.scoring import AboutFit, Evident, ScoredTerm, evidence_of_fit, places_of, scored_terms
-from ema_model.discovery.terms import Term, hidden, noise_of, terms_of
+from ema_model.discovery.rounds import Contender, Refits, Round, Rounds
+from ema_model.discovery.scoring import AboutFit, ScoredTerm, evidence_of_fit, places_of
 from ema_model.effects import CATALOGUE, catalogue_name, find
-from ema_model.estimation.model_fit import Data, Fit, floor_ratio
-from ema_model.estimation.noise import NoiseModel
+from ema_model.estimation.model_fit import Data, Fit, fit, holdout_fit
 from ema_model.faults import NAMES, causes
 from ema_model.side_by_side import fits
 
@@ -53,11 +49,10 @@ Progress = Callable[[str], None]
 
 _REFITTED = 4  # Terms of a round that keep what the algebra promised of them
 _MOST_REFITTED = 8  # Terms of a round
-_MADE_ANEW = 32  # Terms beside a further model, by what those of the first one tell beside it
 _SLIGHT = "beside what is left it tells too little"
 _IDLE = "the error does not fall with it"
 _TINY = 1e-9
-_APART = 0.5  # orders, closer than which two are one
+_WAYS = 2  # other ways that a search goes
 NO_LIMIT = 100  # of effects
 
 
@@ -117,132 +112,16 @@ def search(
     return found
 
 
-# --- one round: all Terms beside one model, and the few that are refitted ---------------------------------------------
+# --- a round: all Terms beside one model, and the few that are refitted -----------------------------------------------
 
 
 @dataclass(frozen=True, eq=False)
-class Contender:
-    """A refitted trial, and how much more probable it makes the recordings than the model that it was tried beside."""
+class Way:
+    """Another way on from a model: a Term that took about as much of its error as the one that was added."""
 
+    before: Fit  # where it leaves
+    key: str  # of what was added there
     trial: Trial
-    gain: float  # logarithm, with what is known of it beforehand
-    fitted: float  # the same by what was fitted alone
-    density: float  # the logarithm of the probability density at its most probable parameters alone
-
-    def is_told_apart_from(self, other: Contender) -> bool:
-        """Whether the recordings tell this one from another that is less probable.
-
-        Not from one that fits as well, and is less probable for its freedom alone.
-        """
-        return other.gain < self.gain - NAMED and other.density < self.density - AS_WELL
-
-
-@dataclass(frozen=True, eq=False)
-class Round:
-    """What was seen of all Terms beside one model."""
-
-    beside: Fit
-    noise: NoiseModel
-    before: Evident  # of that model
-    hidden: Sequence[Candidate]  # what the model has no place for, or these recordings cannot show
-    best: Sequence[ScoredTerm]  # by algebra, the most probable first
-
-    @property
-    def prior(self) -> float:
-        """Logarithm of the odds that any one of the Terms is missing."""
-        return math.log(ANY_MISSING / max(1, len(self.best)))
-
-    def contender(self, data: Data, held: Data | None, one: ScoredTerm, trial: Trial) -> Contender:
-        """A Term that was refitted."""
-        after, share = evidence_of_fit(data, held, trial.fit, self.noise), one.term.log_share
-        fitted = after.fitted - self.before.fitted + share
-        return Contender(trial, after.log - self.before.log + share, fitted, after.density + after.unseen)
-
-    def probabilities(self, contenders: Sequence[Contender] = (), ruled_out: Collection[str] = ()) -> dict[str, float]:
-        """How probable each candidate is, of all and none: of what was refitted by that, of the others by algebra."""
-        gains = {one.candidate.name: one.gain for one in self.best}
-        gains |= {one.trial.candidate.name: one.gain for one in contenders}
-        odds = {name: gain + self.prior for name, gain in gains.items() if name not in ruled_out}
-        whole = float(np.logaddexp.reduce([0.0, *odds.values()]))
-        return {name: math.exp(one - whole) for name, one in odds.items()}
-
-    def candidates(self, contenders: Sequence[Contender] = (), ruled_out: Collection[str] = ()) -> list[Candidate]:
-        """All candidates, the most probable first, with what their refits gave; what cannot be shown says so.
-
-        ruled_out: those that something speaks against, which are not probable, whatever they make of the recordings.
-        """
-        drops = {one.trial.candidate.name: one.trial.drop for one in contenders}
-        probable = self.probabilities(contenders, ruled_out)
-        found = {one.candidate.name: one.candidate for one in self.best}
-        found |= {one.name: one for one in self.hidden if one.name not in drops}
-        every = [
-            replace(
-                one, refitted_drop=drops.get(name), probability=None if name in ruled_out else probable.get(name, 0.0)
-            )
-            for name, one in found.items()
-        ]
-        return sorted(every, key=lambda one: -(one.probability or 0.0))
-
-
-class Rounds:
-    """Rounds beside the models of a story, the last one kept; it may outlast a search."""
-
-    def __init__(self, candidates: Sequence[str] | None = None) -> None:
-        self._names = candidates
-        self._last: tuple[Fit, Data | None, Round] | None = None  # with what was held out
-        self._made: list[Term] = []  # all Terms of effects, beside an earlier model
-        self._hidden: Sequence[Candidate] = ()
-
-    def beside(self, story: Story, tell: Progress = lambda text: None) -> Round:
-        """All Terms beside the last model of a story."""
-        found, held = story.current, story.held
-        if self._last is None or self._last[0] is not found or self._last[1] is not held:
-            noise = noise_of(story.data, found)
-            tell("scoring the candidates")
-            best = scored_terms(found, self._terms(story, noise), noise)
-            before = evidence_of_fit(story.data, held, found, noise)
-            self._last = found, held, Round(found, noise, before, self._hidden, best)
-        return self._last[2]
-
-    def _terms(self, story: Story, noise: NoiseModel) -> list[Term]:
-        """The Terms beside the last model: the first time all of them, then anew those that might tell most.
-
-        What a Term changes depends little on what else is in the model: enough to know which are hopeless.
-        """
-        found, known, shown = story.current, self._made, story.left().orders
-        are_of_this = known and len(known[0].columns) == len(found.residual)
-        if not are_of_this or found.actuator.axes.motor == "linear":  # whose orders are the residual's
-            prints, barred = story.fingerprints(self._names or None)
-            unseen = [Candidate(name, 0.0, {}, reason) for name, reason in hidden(found, prints).items()]
-            self._hidden = [*unseen, *barred]
-            terms = terms_of(story.data, found, [*prints, *_further_orders(story, shown)], noise, shown)
-            self._made = [one for one in terms if one.fingerprint and not one.fingerprint.frees]
-            return terms
-        about = AboutFit.of(found, noise)
-        own = evidence_of(noise, about.residual, about.unknowns)
-        gains = gains_of(noise, own, about.unknowns, [one.unknowns for one in known])
-        telling = [known[i] for i in np.argsort(-gains)[:_MADE_ANEW]]
-        names = {one.name for one in telling}
-        orders = sorted({one.fingerprint.settings["order"] for one in telling if "order" in one.fingerprint.settings})
-        present = found.actuator.effects
-        ours = [name for name in story.of_the_file if name in present]  # beyond their tolerances
-        prints, _ = story.fingerprints([*(name for name in CATALOGUE if name in names), *ours], orders)
-        terms = terms_of(story.data, found, [*prints, *_further_orders(story, orders)], noise, shown)
-        return terms + [one for one in known if one.name not in names and one.name not in present]
-
-
-@dataclass(frozen=True, eq=False)
-class Refits:
-    """What refits made of the most probable Terms of a round."""
-
-    round: Round
-    contenders: list[Contender]  # the most probable first
-    spoken_against: dict[str, str]  # why what is so probable is not named, by the candidate's name
-
-    @property
-    def candidates(self) -> list[Candidate]:
-        """All of the round, the most probable first."""
-        return self.round.candidates(self.contenders, self.spoken_against)
 
 
 def refits_beside(
@@ -288,6 +167,7 @@ class Search:
         self._objections: dict[Contender, str] = {}  # to contenders, by identity
         self._exchanges: set[tuple[str, str]] = set()  # that were tried
         self._barred: set[str] = set()  # effects that were added, and spoken against once all was there
+        self._ways: list[Way] = []  # not gone yet
 
     # --- whether a closed loop is worth a search ----------------------------------------------------------------------
 
@@ -316,6 +196,7 @@ class Search:
         """Goes on to the end, draws what is unknown, and settles."""
         story, tell = self.story, self._tell
         self._go_to_the_end()
+        self._go_other_ways()
         self._curve_instead()
         if not story.current.calibration.is_final:
             story.finish(tell)
@@ -432,6 +313,7 @@ class Search:
             return False
         if others and not self._rivals:
             self._rivals = [first.trial, *others]
+        before = story.current
         story.add(first.trial, ties=[trial.candidate.name for trial in others])
         story.finish(self._tell)
         if not first.trial.faults and not _falls(story):  # fitted to its end, as it did when fitted roughly
@@ -440,7 +322,74 @@ class Search:
         if not first.trial.faults:
             probable = seen.probabilities(contenders, ruled_out)
             story.set_probability(min(1.0, sum(probable[name] for name in as_probable)))
+            self._ways += [
+                Way(before, story.added[-1].key, one.trial)
+                for one in named
+                if one.trial.candidate.name not in as_probable and self._takes_as_much(one.trial, first.trial)
+            ]
         return True
+
+    # --- other ways ---------------------------------------------------------------------------------------------------
+
+    def _takes_as_much(self, other: Trial, best: Trial) -> bool:
+        """Whether another trial leaves about as little, where both leave more than a model may."""
+        return _shapes_between(self.story.data, self.story.held, other.fit, best.fit) < NAMED
+
+    def _go_other_ways(self) -> None:
+        """Goes on from what took about as much as something that was added: beside a large rest that says little.
+
+        Where the model still leaves more than it may, what took as much is as good a name, if it led to no better one.
+        """
+        for way in sorted(self._ways, key=lambda one: one.trial.fit.chi2)[:_WAYS]:
+            gain = self._gone(way)
+            if gain is not None and abs(gain) <= NAMED:
+                self.story.tie(way.key, way.trial.candidate.name, True)
+            elif gain is not None and gain < 0.0:
+                self._ways = [one for one in self._ways if one is not way]
+        if within_band(self.story.data, self.story.current):
+            return
+        for one in self.story.added:
+            alike = {way.trial.candidate.name for way in self._ways if way.key == one.key} - {*self.story.named}
+            if len(alike) >= LARGEST_GROUP:
+                self._take_back(one, f"{len(alike)} others tell as much")
+                return
+            for name in alike:
+                self.story.tie(one.key, name, True)
+
+    def _gone(self, way: Way) -> float | None:
+        """How much more probable the model is that another way ends at, which then is the story's; None: it leads on.
+
+        At the floor by its evidence, elsewhere by what its rest says.
+        """
+        story, name = self.story, way.trial.candidate.name
+        place = next((i for i, step in enumerate(story.steps) if step.fit is way.before), None)
+        added = {one.key: one for one in story.added}
+        known = {*story.named, *causes(story.current.faults)}
+        if place is None or name in known or way.key not in added or name in added[way.key].same_as:
+            return None
+        self._tell(f"going on from {name} in place of {added[way.key].name}")
+        branch = replace(story, steps=story.steps[: place + 1], ties={}, refused={}, warnings=[])
+        branch.add(way.trial)
+        branch.finish(self._tell)
+        other = Search(branch, self._names, self._most, self._tell, self._rounds.elsewhere())
+        other._barred = {*self._barred}
+        other._go_to_the_end()
+        if not branch.added:
+            return -math.inf
+        data, held = story.data, story.held
+        there = branch.current
+        if not branch.data.weighs_as(data):
+            there = fit(data, there.actuator, there.starts, self._tell, there.faults)
+        gain = story.gain(there)
+        if not within_band(data, there) and not within_band(data, story.current):
+            rest = _shapes_between(data, held, story.current, there)
+            gain = math.copysign(min(abs(gain), abs(rest)), gain) if gain * rest > 0.0 else 0.0
+        if gain > NAMED:
+            branch.set_probability(1.0 / (1.0 + math.exp(-gain)), way.trial.candidate.name)
+            story.take_over(branch)
+            self._rivals, self._refitted, self._ways = [], None, []
+            self._barred = other._barred
+        return gain
 
     def _objection(self, one: Contender) -> str:
         """What speaks against a contender, "" if nothing does: a value that no such part has, or recordings disagree.
@@ -465,8 +414,7 @@ class Search:
 
     def _idle(self, found: Fit) -> str:
         """Whether the error that is told does not fall: a verdict says no more than its ladder."""
-        data, current = self.story.data, self.story.current
-        first, last = (floor_ratio(data, one.plant, one.calibration.signals) for one in (current, found))
+        first, last = (told_ratio(self.story.data, one) for one in (self.story.current, found))
         return "" if last < (1.0 - LEAST_FALL) * first else _IDLE
 
     def _denied(self, one: Contender) -> str:
@@ -675,6 +623,17 @@ def _fall(before: float, after: float, left: float) -> float:
     return math.log(max(_TINY, 1.0 + (before**2 - after**2) / left**2))
 
 
+def _shapes_between(data: Data, held: Data | None, other: Fit, best: Fit) -> float:
+    """How much more probable a fit is than another, whose rest beyond the floor counts as `_shapes_told` has it."""
+    beyond = 1.0 - (most_of_floor(data.floor_spread) / told_ratio(data, best)) ** 2
+    if beyond <= 0.0:
+        return math.inf
+    told = len(data.measurements) * math.log(told_ratio(data, other) / told_ratio(data, best))
+    if held is not None:
+        told += len(held.measurements) * math.log(holdout_fit(held, other)[0] / holdout_fit(held, best)[0])
+    return SHAPES * told / beyond
+
+
 def _falls(story: Story) -> bool:
     """Whether the error that is told fell with the last step."""
     before, after = (rung.rmse for rung in story.ladder[-2:])
@@ -707,19 +666,6 @@ def _of_other_parts(best: Trial, others: Sequence[Trial]) -> list[Trial]:
 
 def _of_drive(one: Candidate) -> bool:
     return one.name not in NAMES and find(one.name).family == "drive"
-
-
-def _further_orders(story: Story, orders: Sequence[float]) -> list[Fingerprint]:
-    """Fingerprints of the model's periodic effects at further orders, of these."""
-    found = story.current
-    present = found.actuator.effects
-    names = {name for key in present if (name := catalogue_name(key)) in CATALOGUE and CATALOGUE[name].is_periodic}
-    prints = []
-    for name in sorted(names):
-        known = [values["order"] for key, values in present.items() if catalogue_name(key) == name]
-        apart = [one for one in orders if all(abs(one - other) >= _APART for other in known)]
-        prints += fingerprints(story.data, found, [f"{name}_{len(known) + 1}"], apart)
-    return prints
 
 
 def _still_alike(story: Story, rivals: Sequence[Trial]) -> list[Trial]:

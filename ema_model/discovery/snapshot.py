@@ -15,7 +15,8 @@ from ema_model.discovery.criteria import WORTH_A_LOOK
 from ema_model.discovery.history import Step, Story
 from ema_model.discovery.remaining import Left
 from ema_model.discovery.result import Added, Candidate, Discovery
-from ema_model.discovery.search import Refits, Rounds, refits_beside
+from ema_model.discovery.rounds import Refits, Rounds
+from ema_model.discovery.search import refits_beside
 from ema_model.discovery.words import primary
 from ema_model.effects import find
 from ema_model.effects.user import Expression

@@ -161,8 +161,18 @@ def settings_at(found: Fit, one: Fingerprint, amounts: Array) -> dict[str, float
 def strong_case(found: Fit, effect: Effect) -> float:
     """A strong case of an effect's first parameter; of one that counts by a signal's size, what this machine may have.
 
-    The library's own machine has other currents, and other torques: a greater motor's teeth pull as much harder.
+    The library's own machine has other currents, and other torques: a greater motor's teeth pull as much harder.  Of
+    friction that the file has as well, as much again is no more than strong.
     """
+    first = effect.parameters[0]
+    unit = first.name.partition("_")[2]
+    if unit and first.side is MOTOR and effect.duplicates.endswith(unit):
+        own = abs(found.calibration.actuator.value(effect.duplicates))
+        return max(_strong_case(found, effect), own)
+    return _strong_case(found, effect)
+
+
+def _strong_case(found: Fit, effect: Effect) -> float:
     first = effect.parameters[0]
     if first.side is MOTOR and first.unit in _TORQUES:
         usual = find(effect.name).severities[2]  # of the library's machine

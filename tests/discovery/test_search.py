@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from support.hidden_effects import ACTUATOR, SINE, recorded
 
-from ema_model.discovery import discover, search
+from ema_model.discovery import discover, rounds, search
 from ema_model.discovery.evidence import Unknowns, evidence_of, gains_of
 from ema_model.discovery.refit import Trial
 from ema_model.discovery.result import Candidate
@@ -136,7 +136,7 @@ def test_what_promises_more_than_the_refitted_is_refitted_too(monkeypatch, again
     real = {"best": -1.0, "next": 12.0, "third": 3.0}
     of = search.Search(SimpleNamespace(added=(), data=None, held=None, current=None, refused={}))
     before = Evident(0.0, 0.0, 0.0)
-    seen = search.Round(None, None, before, (), terms)
+    seen = rounds.Round(None, None, before, (), terms)
     monkeypatch.setattr(of, "_round", lambda: seen)
     monkeypatch.setattr(of, "_is_far", lambda: False)
     monkeypatch.setattr(
@@ -146,7 +146,7 @@ def test_what_promises_more_than_the_refitted_is_refitted_too(monkeypatch, again
             SimpleNamespace(fit=one.candidate.name, candidate=one.candidate, faults=("k1",)) for one in chosen
         ],
     )
-    monkeypatch.setattr(search, "evidence_of_fit", lambda data, held, fit, noise: Evident(real[fit], 0.0, 0.0))
+    monkeypatch.setattr(rounds, "evidence_of_fit", lambda data, held, fit, noise: Evident(real[fit], 0.0, 0.0))
     monkeypatch.setattr(search, "within_band", lambda data, found: is_within)
     monkeypatch.setattr(of, "_spoken_against", lambda one: "it is none" if one.trial.fit == against else "")
     assert [(one.trial.fit, one.gain) for one in of._contenders()] == refitted
@@ -169,7 +169,7 @@ def test_an_effect_whose_error_does_not_fall_in_the_end_is_taken_back_and_not_tr
     story.finish = story.set_probability = lambda tell: None
     of = search.Search(story)
     trial = Trial(Candidate("friction_zone", 1.0, {}), {"friction_zone": {}}, SimpleNamespace(), 1.0)
-    monkeypatch.setattr(of, "_round", lambda: search.Round(None, None, Evident(0.0, 0.0, 0.0), (), []))
+    monkeypatch.setattr(of, "_round", lambda: rounds.Round(None, None, Evident(0.0, 0.0, 0.0), (), []))
     known = [search.Contender(trial, 500.0, 500.0, 500.0)]
     monkeypatch.setattr(of, "_contenders", lambda: [one for one in known if one.trial.candidate.name not in of._barred])
     monkeypatch.setattr(of, "_spoken_against", lambda one: "")
@@ -181,6 +181,55 @@ def test_an_effect_whose_error_does_not_fall_in_the_end_is_taken_back_and_not_tr
         of.step()
         assert not of._going
     assert bool(story.added) == kept
+
+
+# --- other ways: what took as much of the error, beside a large rest --------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("gains", "is_within", "same_as"),
+    [
+        ({"b": -9.0}, False, ["a"]),
+        ({"b": 3.0}, False, ["a", "b"]),
+        ({"b": -9.0, "c": 2.0}, False, ["a", "c"]),
+        ({"b": 3.0, "c": 2.0, "d": 0.0}, False, []),
+        ({"b": 3.0, "c": 2.0, "d": 0.0}, True, ["a", "b", "c"]),
+        ({"b": None}, True, ["a"]),
+    ],
+    ids=[
+        "led to less",
+        "as far",
+        "one of two",
+        "one more than a group holds",
+        "the floor is reached",
+        "is in the model",
+    ],
+)
+def test_what_leads_as_far_is_as_good_a_name(monkeypatch, gains, is_within, same_as):
+    """By the logarithm of how much more probable the model is that another way ends at; two are gone at most."""
+    added = SimpleNamespace(key="a", name="a", same_as=[])
+    story = SimpleNamespace(added=[added], named=["a"], data=None, held=None, current=None, refused={})
+    story.tie = lambda key, name, equal: added.same_as.append(name)
+    story.back_to_before = lambda key: story.added.clear()
+    monkeypatch.setattr(search, "within_band", lambda data, found: is_within)
+    of = search.Search(story)
+    of._ways = [
+        search.Way(None, "a", Trial(Candidate(name, 1.0, {}), {}, SimpleNamespace(chi2=place), 1.0))
+        for place, name in enumerate(gains)
+    ]
+    monkeypatch.setattr(of, "_gone", lambda way: gains[way.trial.candidate.name])
+    of._go_other_ways()
+    named = [one.name for one in story.added]
+    assert sorted({*named, *added.same_as}) == same_as if named else same_as == []
+    assert bool(named) or story.refused == {"a": "3 others tell as much"}
+
+
+@pytest.mark.parametrize(("best", "other", "told"), [(1.0, 9.0, np.inf), (10.0, 11.0, 1.95), (10.0, 10.0, 0.0)])
+def test_what_is_left_beyond_the_floor_counts_as_a_few_values(monkeypatch, best, other, told):
+    """However long the recordings are: 20 a recording, of which one model takes a tenth more than another."""
+    monkeypatch.setattr(search, "told_ratio", lambda data, found: found)
+    data = SimpleNamespace(floor_spread=0.05, measurements=["one"])
+    assert search._shapes_between(data, None, other, best) == pytest.approx(told, rel=0.05)
 
 
 # --- whether a closed loop is searched, and what stays of its rivals --------------------------------------------------
@@ -309,7 +358,7 @@ def test_what_a_richer_law_begins_with_is_refitted_beside_it(monkeypatch):
     ]
     story = SimpleNamespace(added=(), data=None, held=None, current=None, refused={})
     of = search.Search(story)
-    monkeypatch.setattr(of, "_round", lambda: search.Round(None, None, Evident(0.0, 0.0, 0.0), (), terms))
+    monkeypatch.setattr(of, "_round", lambda: rounds.Round(None, None, Evident(0.0, 0.0, 0.0), (), terms))
     monkeypatch.setattr(of, "_is_far", lambda: False)
     monkeypatch.setattr(
         of, "_refits", lambda chosen: [search.Contender(_trial(one), one.gain, 0.0, 0.0) for one in chosen]

@@ -20,7 +20,7 @@ from ema_model.discovery import Candidate, Story, begun, result_of
 from ema_model.discovery.history import Step
 from ema_model.discovery.refit import Trial, with_drops
 from ema_model.discovery.result import Experiment
-from ema_model.discovery.search import Refits, Rounds
+from ema_model.discovery.rounds import Refits, Rounds
 from ema_model.discovery.snapshot import Assessment, Look, assessed, known_of, look_at, refined
 from ema_model.discovery.words import effect_title
 from ema_model.effects import CATALOGUE, catalogue_name

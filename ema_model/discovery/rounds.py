@@ -22,7 +22,7 @@ from ema_model.estimation.noise import NoiseModel
 
 Progress = Callable[[str], None]
 
-_MADE_ANEW = 32  # Terms beside a further model, by what those of the first one tell beside it
+_MADE_ANEW, _AT_ORDERS = 16, 32  # candidates beside a further model, and Terms at whose orders, by what they tell there
 _APART = 0.5  # orders, closer than which two are one
 
 
@@ -133,9 +133,10 @@ class Rounds:
         about = AboutFit.of(found, noise)
         own = evidence_of(noise, about.residual, about.unknowns)
         gains = gains_of(noise, own, about.unknowns, [one.unknowns for one in known])
-        telling = [known[i] for i in np.argsort(-gains)[:_MADE_ANEW]]
-        names = {one.name for one in telling}
-        orders = sorted({one.fingerprint.settings["order"] for one in telling if "order" in one.fingerprint.settings})
+        telling = [known[i] for i in np.argsort(-gains)]
+        names = {*[*dict.fromkeys(one.name for one in telling)][:_MADE_ANEW]}
+        its = [one.fingerprint.settings for one in telling[:_AT_ORDERS]]
+        orders = sorted({settings["order"] for settings in its if "order" in settings})
         present = found.actuator.effects
         ours = [name for name in story.of_the_file if name in present]  # beyond their tolerances
         prints, _ = story.fingerprints([*(name for name in CATALOGUE if name in names), *ours], orders)

@@ -260,14 +260,15 @@ def results_part(members: Callable[[], Mapping[str, Provenance]]) -> Part:
     def save() -> dict[str, Any]:
         saved = {name: one.saved() for name, one in members().items()}
         told = msgspec.to_builtins({name: one for name, one in saved.items() if one is not None})
-        return {"of": told, "whole": {name: found for name in told if (found := _whole(members()[name])) is not None}}
+        for name, one in told.items():
+            if (found := _whole(members()[name])) is not None:
+                one["whole"] = found
+        return told
 
     def restore(given: Any, names: Mapping[str, str]) -> None:
-        is_new = isinstance(given, dict) and given.keys() == {"of", "whole"} and isinstance(given["whole"], dict)
-        told, whole = (given["of"], given["whole"]) if is_new else (given, {})  # before results were saved whole
-        saved: dict[str, SavedResult] = taken(dict[str, SavedResult], told, "list of results")
+        saved: dict[str, SavedResult] = taken(dict[str, SavedResult], given, "list of results")
         for name, one in members().items():
-            one.bring(saved.get(name), names, whole.get(name))
+            one.bring(saved.get(name), names, given.get(name, {}).get("whole"))
 
     return Part(save, restore)
 

@@ -8,14 +8,14 @@ fields beside its JSON form, as the series of a comparison, is told by it and no
 from __future__ import annotations
 
 import importlib
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, fields, is_dataclass
 from functools import cache
 from importlib.metadata import entry_points
 from operator import attrgetter
 from pathlib import Path
 from types import NoneType, UnionType
-from typing import Annotated, Any, Protocol, Self, TypedDict, Union, cast, get_args, get_origin, get_type_hints
+from typing import Annotated, Any, Literal, Protocol, Self, TypedDict, Union, cast, get_args, get_origin, get_type_hints
 
 import msgspec
 import numpy as np
@@ -66,6 +66,22 @@ class Result(InWords):
             return msgspec.convert(_stored(given, cls), cls, dec_hook=_array)
         except (msgspec.ValidationError, ValueError, TypeError) as error:
             raise InputError(f"no {cls.__name__} can be made of it ({quoted(error, 120)}); compute it anew") from None
+
+    def stored(self) -> dict[str, Any]:
+        """All its fields, series too: plain values and arrays.  InputError for a result that holds what has none."""
+        return _stored_whole(self, {})
+
+    @classmethod
+    def restored(cls, given: Any) -> Self:
+        """What `stored` gave, nothing computed; InputError, one line, for what is damaged or of another version."""
+        try:
+            return _restored_whole(given, cls, [])
+        except InputError:
+            raise
+        except (ArithmeticError, AttributeError, LookupError, RecursionError, TypeError, ValueError) as error:
+            raise InputError(
+                f"it was stored by another version, or is damaged ({quoted(error, 80)}); compute it anew"
+            ) from None
 
     @property
     def lines(self) -> list[str]:
@@ -270,3 +286,113 @@ def _array(kind: Any, given: Any) -> Any:
     if get_origin(kind) is np.ndarray or kind is np.ndarray:
         return np.array(given, dtype=float)  # None becomes NaN
     raise NotImplementedError(f"{kind} is not restored")
+
+
+# --- a result whole, as a session stores it: each dataclass by its fields, each object once ---------------------------
+
+
+def _stored_whole(value: Any, known: dict[int, int]) -> Any:
+    """Plain values and arrays; known: the places of dataclasses that are stored, by their id."""
+    if value is None or isinstance(value, str | bool | int | float | np.ndarray):
+        return value
+    if isinstance(value, np.generic):
+        return value.item()
+    if is_dataclass(value) and not isinstance(value, type):
+        if id(value) in known:
+            return {"same": known[id(value)]}
+        own = {
+            one.name: _stored_whole(getattr(value, one.name), known)
+            for one in fields(value)
+            if one.init and not one.name.startswith("_")
+        }
+        known[id(value)] = len(known)
+        return {"class": type(value).__name__, "fields": own}
+    if isinstance(value, Mapping):
+        return [[_stored_whole(name, known), _stored_whole(one, known)] for name, one in value.items()]
+    if isinstance(value, list | tuple | set | frozenset):
+        return [_stored_whole(one, known) for one in value]
+    raise InputError(f"a {type(value).__name__} is not stored; compute it anew")
+
+
+def _restored_whole(given: Any, kind: Any, known: list[Any]) -> Any:
+    """The same as the type says that it is, and as nothing else."""
+    origin, parts = get_origin(kind), get_args(kind)
+    if origin is Annotated:
+        return _restored_whole(given, parts[0], known)
+    if origin in (Union, UnionType):
+        return _restored_whole(given, _of_several(given, parts), known)
+    if origin is np.ndarray or kind is np.ndarray:
+        return _as_said(given, np.ndarray)
+    if origin is Literal:
+        if given not in parts:
+            raise ValueError(f"none of {parts}")
+        return given
+    if isinstance(kind, type) and is_dataclass(kind):
+        return _restored_object(_as_said(given, dict), kind, known)
+    of = origin or kind
+    if isinstance(of, type) and issubclass(of, Mapping):
+        return {
+            _restored_whole(name, parts[0], known): _restored_whole(one, parts[1], known)
+            for name, one in _as_said(given, list)
+        }
+    if of is tuple and parts[-1:] != (...,):
+        if len(_as_said(given, list)) != len(parts):
+            raise ValueError(f"{len(parts)} values are expected")
+        return tuple(_restored_whole(one, part, known) for one, part in zip(given, parts))
+    if of in _MANY:
+        return _MANY[of](_restored_whole(one, parts[0], known) for one in _as_said(given, list))
+    if of is float:
+        return float(_as_said(given, int | float))
+    if of in (str, int, bool, NoneType):
+        return _as_said(given, of)
+    raise TypeError(f"{kind} is not restored")
+
+
+_MANY: dict[Any, Callable[[Any], Any]] = {
+    tuple: tuple, list: list, Sequence: list, Collection: list, set: set, frozenset: frozenset
+}  # fmt: skip
+
+
+def _restored_object(given: dict[str, Any], kind: type, known: list[Any]) -> Any:
+    if "same" in given:
+        found = known[_as_said(given["same"], int)]
+        return _as_said(found, kind)
+    of = {one.__name__: one for one in _kinds(kind)}[given["class"]]
+    hints, own = get_type_hints(of, include_extras=True), given["fields"]
+    wanted = [one.name for one in fields(of) if one.init and not one.name.startswith("_")]
+    if set(wanted) != set(own):
+        raise ValueError(f"a {of.__name__} has other fields")
+    found = of(**{name: _restored_whole(own[name], hints[name], known) for name in wanted})
+    known.append(found)
+    return found
+
+
+def _kinds(kind: type) -> list[type]:
+    """A dataclass and all that are made of it."""
+    return [kind, *(one for more in kind.__subclasses__() for one in _kinds(more))]
+
+
+def _of_several(given: Any, kinds: Sequence[Any]) -> Any:
+    """Which of several types a stored value is of."""
+    if given is None:
+        return NoneType
+    others = [one for one in kinds if one is not NoneType]
+    for one in others:
+        plain_type = get_origin(one) or one
+        if plain_type is Annotated:
+            plain_type = get_origin(get_args(one)[0]) or get_args(one)[0]
+        is_object = isinstance(plain_type, type) and is_dataclass(plain_type)
+        if isinstance(given, dict):
+            if is_object and ("same" in given or given.get("class") in [each.__name__ for each in _kinds(plain_type)]):
+                return one
+        elif isinstance(given, list) and not is_object and plain_type not in (str, int, float, bool, np.ndarray):
+            return one
+        elif isinstance(plain_type, type) and isinstance(given, plain_type):
+            return one
+    return others[0]
+
+
+def _as_said(given: Any, kind: Any) -> Any:
+    if not isinstance(given, kind) or (isinstance(given, bool) and kind is not bool):
+        raise TypeError(f"a {type(given).__name__} stands where another type is expected")
+    return given

@@ -323,8 +323,8 @@ def test_an_effect_acts_on_both_kinds_of_axes(copied):
 
 @pytest.mark.long
 def test_a_command_and_a_format(copied):
-    copied("-m", "emaviz", "simulate", "--command", "square", "--duration", "0.2", "--model", "mm", "--out", "run.csv")
-    header, *rows = (copied.folder / "run.csv").read_text().splitlines()
+    copied("-m", "emaviz", "simulate", "--command", "square", "--duration", "0.2", "--model", "mm", "--out", "wave.csv")
+    header, *rows = (copied.folder / "wave.csv").read_text().splitlines()
     lines = [json.dumps(header.split(",")), *(json.dumps([float(cell) for cell in row.split(",")]) for row in rows)]
     (copied.folder / "run.rows").write_text("\n".join(lines))
     copied("-m", "emaviz", "compare", "run.rows", "--no-calibrate", "--json", "found.json")

@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ema_model import faults
 from ema_model.actuator import Actuator
+from ema_model.campaign.result import Campaign
 from ema_model.campaign.store import Store
 from ema_model.commands import command
 from ema_model.faults import HEALTHY, NAMES, performance_coefficient, vector
@@ -646,6 +647,12 @@ class Evaluation(Result):
     """The thesis's evaluation, computed anew, beside its printed numbers: the rows of a campaign of its plan."""
 
     store: Store
+    drawn: Drawn | None = None  # the responses that the thesis draws
+
+    @cached_property
+    def campaign(self) -> Campaign:
+        """The same rows as of any campaign."""
+        return Campaign(self.store)
 
     @cached_property
     def rows(self) -> list[dict[str, Any]]:

@@ -10,8 +10,6 @@ from typing import Annotated, Any, Literal, NotRequired, TypedDict
 
 from msgspec import Meta
 
-from ema_model.campaign.store import GroupJson
-
 
 class VersionsJson(TypedDict):
     """What computed the result."""
@@ -168,13 +166,9 @@ class SavedModelJson(TypedDict):
     saved_actuator: NotRequired[Annotated[SavedActuatorJson, Meta(description="with --save-actuator")]]
 
 
-class CampaignJson(TypedDict):
-    """How far a campaign is; of a run, `status` and `report`."""
+class InterruptedCampaignJson(TypedDict):
+    """What is besides in the answer of a campaign's run."""
 
-    title: Annotated[str, Meta(description="of the plan")]
-    version: Annotated[dict[str, str], Meta(description="of emaviz, a hash of its sources, and of its libraries")]
-    commit: Annotated[str, Meta(description="of its source; empty where that is not known")]
-    groups: Annotated[dict[str, GroupJson], Meta(description="by name")]
     interrupted: NotRequired[Annotated[bool, Meta(description="true where a run was interrupted")]]
 
 

@@ -264,6 +264,8 @@ def _points(chart: go.Figure, x: np.ndarray, y: np.ndarray, name: str, marker: d
 
 
 def _mean(chart: go.Figure, bins: Binned, axis: Quantity, shown: Quantity, name: str, colour: str) -> None:
+    if not len(bins.mean):  # of a recording that is too short
+        return
     many = len(bins.mean) > 60
     apart = 1 + np.flatnonzero(bins.low[1:] > bins.high[:-1] + 1e-9 * np.ptp(bins.high))  # no line where nothing is
     x, y, error = (np.insert(one, apart, np.nan) for one in (bins.centre, bins.mean, bins.error))
@@ -323,7 +325,7 @@ def residual_polar(
         _fill(chart, np.concatenate([arc, arc[::-1]]), outline, theme.SHADE, "worst region", i == 0)
     # gaps of angles that were not visited stay open
     gap = np.flatnonzero(np.diff(theta) > 3.0 * np.median(np.diff(theta))) + 1 if len(theta) > 2 else np.zeros(0, int)
-    closed = not len(gap) and theta[0] + 360.0 - theta[-1] <= 3.0 * np.median(np.diff(theta))
+    closed = not len(gap) and len(theta) > 1 and theta[0] + 360.0 - theta[-1] <= 3.0 * np.median(np.diff(theta))
     ring_t, ring_m, ring_e = (np.append(v, v[0]) if closed else v for v in (theta, mean, error))
     for part in np.split(np.arange(len(ring_t)), gap):
         t, m, e = ring_t[part], ring_m[part], ring_e[part]

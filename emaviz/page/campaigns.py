@@ -10,6 +10,7 @@ from urllib.parse import quote
 import plotly.graph_objects as go
 import viser
 
+from ema_model.campaign.result import Campaign
 from ema_model.campaign.store import Store, summaries
 from ema_model.errors import InputError
 from ema_model.recordings import Measurement
@@ -18,12 +19,12 @@ from emaviz.page.panel import JobLine
 from emaviz.page.share import Place
 from emaviz.page.tab import Standing
 from emaviz.page.workspaces import Page, Workspace
-from emaviz.report.campaign import Rows, answers, errors_drawn, of_known_truth
 from emaviz.server.safe_server import RESULTS
 from emaviz.session.campaigns import REPORT, Campaigns, Computing
 from emaviz.session.inputs import Provenance
 from emaviz.session.jobs import Worker
 from emaviz.text.html import Html, add_html, begin, html, joined, said
+from emaviz.views.campaign import answers, errors_drawn
 
 # --- campaigns, below the recordings: which one, its progress, and the row that opens as a run ------------------------
 
@@ -244,10 +245,10 @@ class _Starts:
 
 def figures(store: Store) -> list[go.Figure]:
     """How the errors of identifications are spread, and how often what was answered."""
-    rows = Rows(store)
-    known = of_known_truth(rows)
+    found = Campaign(store)
+    known = found.of_known_truth()
     drawn = [errors_drawn(known)] if known else []
-    return (drawn + [counted(title, counts) for title, counts in answers(rows).items()])[:_MOST_FIGURES]
+    return (drawn + [counted(title, counts) for title, counts in answers(found).items()])[:_MOST_FIGURES]
 
 
 def progress_bars(store: Store) -> Html:

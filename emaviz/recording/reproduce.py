@@ -39,7 +39,7 @@ _SIGNALS = ("current_A", "user_position_rad", "motor_position_rad", "motor_speed
 _SHADES = tuple((*colours.rgb(shade), 255) for shade in colours.REFERENCE_SHADES)
 
 
-def write_reproduction(evaluation: Evaluation, drawn: Drawn, path: str | Path) -> None:
+def write_reproduction(evaluation: Evaluation, path: str | Path) -> None:
     """Writes a whole .rrd file; InputError in one line where that cannot be done."""
     try:
         with ReproductionWriter(path) as writer:
@@ -47,7 +47,8 @@ def write_reproduction(evaluation: Evaluation, drawn: Drawn, path: str | Path) -
             writer.tables(evaluation)
             for case in CASES:
                 writer.convergence(evaluation, case.name)
-            writer.responses(drawn)
+            if evaluation.drawn is not None:
+                writer.responses(evaluation.drawn)
     except RecordingError as error:
         raise InputError(str(error)) from None
     if writer.failed is not None:

@@ -6,12 +6,11 @@ import base64
 import hashlib
 import html
 import json
-from abc import ABC, abstractmethod
 from collections.abc import Iterable, Sequence
 from datetime import datetime
 from importlib import resources
 from pathlib import Path
-from typing import Generic, TypeVar
+from typing import NamedTuple
 
 import plotly.graph_objects as go
 from plotly.offline import get_plotlyjs
@@ -96,9 +95,7 @@ def _class(kind: str) -> str:
     return f' class="{kind}"' if kind else ""
 
 
-# --- what a report is made of: sections that write HTML, and the figures that they place ------------------------------
-
-Subject = TypeVar("Subject")
+# --- what a report is made of: sections as HTML, and the figures that they place ------------------------------
 
 
 class Figures:
@@ -119,29 +116,22 @@ def pair(*figures: str) -> str:
     return f'<div class="pair">{"".join(figures)}</div>'
 
 
-class Section(ABC, Generic[Subject]):
+class Written(NamedTuple):
     """One part of a report, with a heading of its own and an anchor to link to."""
 
     title: str
     anchor: str
-
-    @abstractmethod
-    def body(self, subject: Subject, figures: Figures) -> str:
-        """The HTML below the heading; "" leaves the section out."""
+    body: str  # HTML
 
 
 # --- a whole page: styles, sections, figures and the script that draws them, in one file that asks no network ---------
 
 
-def page(title: str, lead: str, sections: Sequence[Section[Subject]], subject: Subject) -> str:
-    """The HTML of a report; lead: plain text below the title."""
-    figures = Figures()
-    written = [(section, section.body(subject, figures)) for section in sections]
-    written = [(section, body) for section, body in written if body]
-    contents = "".join(f'<a href="#{escape(s.anchor)}">{escape(s.title)}</a>' for s, _ in written)
-    parts = "".join(
-        f'<section id="{escape(s.anchor)}"><h2>{escape(s.title)}</h2>{body}</section>' for s, body in written
-    )
+def page(title: str, lead: str, sections: Iterable[Written], figures: Figures) -> str:
+    """The HTML of a report; lead: plain text below the title.  A section without a body is left out."""
+    written = [one for one in sections if one.body]
+    contents = "".join(f'<a href="#{escape(s.anchor)}">{escape(s.title)}</a>' for s in written)
+    parts = "".join(f'<section id="{escape(s.anchor)}"><h2>{escape(s.title)}</h2>{s.body}</section>' for s in written)
     style, script = _own("page.css"), _own("page.js")
     plotly = get_plotlyjs()
     now = datetime.now().astimezone().strftime("%Y-%m-%d %H:%M %Z")

@@ -17,6 +17,7 @@ from ema_model.actuator import load_actuator
 from ema_model.campaign.kinds import KINDS
 from ema_model.campaign.plan import Plan, load_plan, shipped_plans
 from ema_model.campaign.plan_axes import TaskInputs, inputs_of
+from ema_model.campaign.result import Campaign
 from ema_model.campaign.run import Status, duration, estimate_s, run_plan
 from ema_model.campaign.schedulers import scheduler
 from ema_model.campaign.store import Store
@@ -159,20 +160,17 @@ class Campaigns:
 
     def _write(self, asked: Computing, store: Store) -> list[Path]:
         """The report, in the campaign's folder; beside the thesis also a recording, where the viewer finds it."""
-        from emaviz.report import campaign, reproduce  # plotly takes a second to import
-
         path = store.folder / REPORT
         if not asked.reproduces:
-            campaign.write_campaign_report(store, path)
+            Campaign(store).export(path)
             return [path]
         from ema_model.campaign.thesis import Evaluation, drawn
-        from emaviz.recording.entry import free_name  # as does rerun
-        from emaviz.recording.reproduce import write_reproduction
+        from emaviz.recording.entry import free_name  # rerun takes a second to import
 
-        found, responses = Evaluation(store), drawn(load_actuator())
-        reproduce.write_reproduction_report(found, responses, path)
+        found = Evaluation(store, drawn(load_actuator()))
         recording = free_name(self._session.folder, asked.name, ".rrd")
-        write_reproduction(found, responses, recording)
+        for one in (path, recording):
+            found.export(one)
         return [path, recording]
 
     # --- a row as a run ---------------------------------------------------------------------------------------------

@@ -25,7 +25,7 @@ from emaviz.session import files
 from emaviz.session.data_folder import DataFolder
 from emaviz.session.explore import Session
 from emaviz.session.files import Opened, all_measured, guesses, measured, read_opened, side_file_of, side_with
-from emaviz.session.inputs import Inputs, Provenance, digest, listed, version_of, version_with_side
+from emaviz.session.inputs import Inputs, Provenance, Whole, digest, listed, version_of, version_with_side
 from emaviz.session.jobs import Job, Signal, Tell, Worker, report
 from emaviz.session.settings import number
 
@@ -62,12 +62,15 @@ class Asking:
         begin: Callable[[], bool],
         chosen: Callable[[], Hashable],
         refused: Callable[[str, bool], object],
+        is_known: Callable[[], bool] = lambda: False,
     ) -> None:
         """begin(): False while another long run goes on, InputError for what is missing; chosen(): what it would take.
 
-        refused(why, by_hand): what is missing, or "" once it has begun.
+        refused(why, by_hand): what is missing, or "" once it has begun.  is_known(): whether its answer is there, so
+        that only a person has it computed again.
         """
         self._job, self._title, self._begin, self._chosen, self._refused = job, title, begin, chosen, refused
+        self._is_known = is_known
         self._reading: set[str] = set()
         self._by_hand = False
         self._running: Hashable = None  # what the run that goes on, or did last, was of
@@ -109,7 +112,7 @@ class Asking:
                 return True
             chosen, by_hand = self._chosen(), self._by_hand
             try:
-                begun, why = self._begin(), ""
+                begun, why = (self._is_known() and not by_hand) or self._begin(), ""
             except InputError as error:
                 begun, why = True, str(error)
             if begun and not why:
@@ -246,10 +249,20 @@ class Comparing:
         self.job = Job(session.worker, on_divergence=advice)
         self._files = FileJobs(folder, self.events.failed, session.events.told)
         self.on_error = self._files.on_error
-        self.asking = Asking(self.job, lambda: self._title, self.compare, self._chosen, self.events.missing)
+        self.asking = Asking(
+            self.job,
+            lambda: self._title,
+            self.compare,
+            self._chosen,
+            self.events.missing,
+            lambda: self.finished is not None,
+        )
         self._use(session.actuator)
         self.provenance = Provenance(
             "the comparison", "Compare", self.inputs, self.job, soon=lambda: self.asking.reading
+        )
+        self.provenance.whole = Whole(
+            lambda: None if self.comparison is None else self.comparison.stored(), self._take_comparison
         )
 
     def close(self) -> None:
@@ -525,6 +538,11 @@ class Comparing:
             return f"Compared in {elapsed_s:.1f} s{fitted}."
 
         return self.provenance.begin(lambda: self.job.begin(self._title, work, done), of)
+
+    def _take_comparison(self, stored: Any) -> None:
+        """One of a session's file, as it was."""
+        self.comparison = found = Comparison.restored(stored)
+        self.events.compared(found)
 
     @property
     def finished(self) -> Comparison | None:

@@ -5,11 +5,14 @@ from __future__ import annotations
 import hashlib
 import threading
 from collections.abc import Callable, Collection, Mapping
+from contextlib import suppress
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import msgspec
 
+from ema_model.errors import InputError
 from ema_model.recordings import side_path
 from emaviz.session.jobs import Job
 from emaviz.session.session_file import Part
@@ -55,10 +58,18 @@ class Inputs(msgspec.Struct, frozen=True):
 
 
 class SavedResult(msgspec.Struct, frozen=True):
-    """What a session's file says of a result; the result itself is kept by its tab, where it is."""
+    """What a session's file says of a result; the result itself stands beside, or its tab saves it."""
 
     inputs: Inputs | None = None
     running: str = ""  # what was being computed when it was saved
+
+
+@dataclass(frozen=True)
+class Whole:
+    """How a session's file takes the result of a tab whole, and shows it again without computing."""
+
+    save: Callable[[], Any]  # plain values and arrays; None without a result
+    show: Callable[[Any], None]  # of what was saved; InputError, and nothing is shown, for what makes no sense
 
 
 class ResultFiles:
@@ -120,8 +131,10 @@ class Provenance:
         self.of: Inputs | None = None  # what is shown; None for nothing
         self.files: ResultFiles | None = None  # what can be written of it
         self.missing: SavedResult | None = None  # a session had it, and it is to be computed again
+        self.whole: Whole | None = None  # where its tab does not save it among its own
         self._job, self._soon = job, soon
         self._restored = False  # a session brought the result itself
+        self._is_whole = False  # it is shown as a session brought it, while its files may still be read
         self._coming: Inputs | None = None  # of the run that goes on
         self._error: Inputs | None = None  # of which something was refused, or has failed
         if job is not None:
@@ -131,7 +144,7 @@ class Provenance:
 
     def begin(self, begin: Callable[[], bool], of: Inputs | None = None) -> bool:
         """Begins a run whose result takes the place of the shown one; of: its inputs, else what they are now."""
-        before, begun = self._coming, False
+        before, begun, self._is_whole = self._coming, False, False
         self._coming = self.now() if of is None else of
         try:
             begun = begin()
@@ -143,10 +156,12 @@ class Provenance:
     def take(self, of: Inputs | None = None) -> None:
         """A result is there; of: its inputs, else those of the run that goes on."""
         self.of, self.missing, self._coming = of or self._coming or self.now(), None, None
+        self._is_whole = False
 
     def clear(self) -> None:
         """Nothing is shown any more."""
         self.of = self.missing = self._error = None
+        self._is_whole = False
 
     def _ended(self, job: Job) -> None:
         if job.error:
@@ -190,6 +205,8 @@ class Provenance:
             return f"{again} {running}." if running else again
         if self.of is None:
             return ""
+        if self._is_whole and self.computing and self._coming is None:
+            return ""  # its files are being read
         changed = self.of.changed(self.now())
         if self.computing:
             return f"Out of date: {f'{changed} since; ' if changed else ''}another one is being computed."
@@ -215,8 +232,15 @@ class Provenance:
         self.take()
         self._restored = True
 
-    def bring(self, saved: SavedResult | None, names: Mapping[str, str]) -> None:
-        """Once its tab has taken its part of a session; names: the files' names of now by those of then."""
+    def bring(self, saved: SavedResult | None, names: Mapping[str, str], whole: Any = None) -> None:
+        """Once its tab has taken its part of a session; names: the files' names of now by those of then.
+
+        whole: what `Whole.save` gave; where that cannot be shown, the result is to be computed again.
+        """
+        if whole is not None and self.whole is not None:
+            with suppress(InputError):
+                self.whole.show(whole)
+                self.restored()
         restored, self._restored = self._restored, False
         self.missing = self._error = None
         if saved is None:
@@ -224,6 +248,7 @@ class Provenance:
         inputs = None if saved.inputs is None else saved.inputs.renamed(names)
         if restored and inputs is not None:
             self.of = inputs
+            self._is_whole = whole is not None
         is_here = inputs is not None and self.of is not None and not self.of.changed(inputs)
         if saved.running or not is_here:
             self.missing = SavedResult(inputs, saved.running)
@@ -234,14 +259,39 @@ def results_part(members: Callable[[], Mapping[str, Provenance]]) -> Part:
 
     def save() -> dict[str, Any]:
         saved = {name: one.saved() for name, one in members().items()}
-        return msgspec.to_builtins({name: one for name, one in saved.items() if one is not None})
+        told = msgspec.to_builtins({name: one for name, one in saved.items() if one is not None})
+        for name, one in told.items():
+            if (found := _whole(members()[name])) is not None:
+                one["whole"] = found
+        return told
 
     def restore(given: Any, names: Mapping[str, str]) -> None:
         saved: dict[str, SavedResult] = taken(dict[str, SavedResult], given, "list of results")
         for name, one in members().items():
-            one.bring(saved.get(name), names)
+            one.bring(saved.get(name), names, given.get(name, {}).get("whole"))
 
     return Part(save, restore)
+
+
+_MOST_BYTES = 100_000_000  # of one result's arrays; a larger one is computed again
+
+
+def _whole(of: Provenance) -> Any:
+    """A result as a session's file takes it; None without one, for one that is too large, or is not stored."""
+    if of.whole is None or of.of is None:
+        return None
+    with suppress(InputError):
+        found = of.whole.save()
+        return found if _bytes(found) <= _MOST_BYTES else None
+    return None
+
+
+def _bytes(value: Any) -> int:
+    if isinstance(value, Mapping):
+        return sum(map(_bytes, value.values()))
+    if isinstance(value, list | tuple):
+        return sum(map(_bytes, value))
+    return getattr(value, "nbytes", 0)
 
 
 def version_of(path: Path, *said: object) -> str:

@@ -4,11 +4,14 @@ from __future__ import annotations
 
 import filecmp
 import json
+import math
 import zipfile
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
+
+import numpy as np
 
 from ema_model.errors import InputError, quoted
 from ema_model.files.opened import (
@@ -27,18 +30,20 @@ from ema_model.recordings import side_path
 from emaviz import __version__
 from emaviz.session.data_folder import SESSION_SUFFIX, DataFolder, sanitised
 
-# NAME.emaviz is a zip of `session.json` and the files under `files/`, so that it opens on another computer.
+# NAME.emaviz is a zip of `session.json`, `arrays.bin` with the arrays that it names, and the files under `files/`, so
+# that it opens on another computer.
 
 SCHEMA = 1
-_DOCUMENT, _FILES = "session.json", "files/"
+_DOCUMENT, _ARRAYS, _FILES = "session.json", "arrays.bin", "files/"
+_ARRAY = "__array__"  # in the JSON, in the place of an array: how its numbers are spelled, its shape, where it begins
 
 
 @dataclass(frozen=True)
 class Part:
     """One part of the page.
 
-    save(): what JSON can hold; restore(saved, names): takes it, names being the files' names now by those of then.
-    InputError from `restore` says what makes no sense.  files(): names in the data folder of what it needs.
+    save(): what JSON can hold, and arrays; restore(saved, names): takes it, names being the files' names now by those
+    of then.  InputError from `restore` says what makes no sense.  files(): names in the data folder of what it needs.
     """
 
     save: Callable[[], Any]
@@ -63,7 +68,10 @@ def write_session(path: Path, parts: Mapping[str, Part], folder: DataFolder, nam
                 side = side_path(file)
                 if side != file and side.is_file() and folder.holds(side):
                     archive.write(side, _FILES + folder.name_of(side))
-            archive.writestr(_DOCUMENT, json.dumps(document, indent=1))
+            arrays = bytearray()
+            archive.writestr(_DOCUMENT, json.dumps(_without_arrays(document, arrays), indent=1))
+            if arrays:
+                archive.writestr(_ARRAYS, bytes(arrays))
     except OSError as error:
         raise InputError(f"{quoted(path.name)}: cannot be written ({error.strerror}); check the disk") from None
 
@@ -100,6 +108,12 @@ def _document(archive: SafeZip, path: Path) -> dict[str, Any]:
         document = json.loads(raw)
     except (ValueError, RecursionError):
         document = None
+    if _ARRAYS in archive.names:
+        arrays = archive.read(_ARRAYS)
+        try:
+            document = _with_arrays(document, arrays)
+        except (LookupError, OverflowError, RecursionError, TypeError, ValueError):
+            raise Damaged("its arrays do not fit") from None
     if not isinstance(document, dict) or not isinstance(document.get("files", []), list):
         raise InputError(f"{shown(path.name)}: is no session of emaviz")
     schema = document.get("schema")
@@ -107,6 +121,36 @@ def _document(archive: SafeZip, path: Path) -> dict[str, Any]:
         told = schema if isinstance(schema, int | str) else "unknown"
         raise InputError(f"{shown(path.name)}: was saved by another version (schema {shown(told)})")
     return document
+
+
+def _without_arrays(value: Any, arrays: bytearray) -> Any:
+    """A part of the document with a note in the place of each array, whose bytes are added to the others."""
+    if isinstance(value, np.ndarray):
+        plain = np.ascontiguousarray(value, value.dtype.newbyteorder("<"))
+        if plain.dtype.kind not in _PLAIN:
+            raise TypeError(f"an array of {plain.dtype} is not saved")
+        note = [plain.dtype.str, list(value.shape), len(arrays)]
+        arrays += plain.tobytes()
+        return {_ARRAY: note}
+    if isinstance(value, Mapping):
+        return {name: _without_arrays(one, arrays) for name, one in value.items()}
+    return [_without_arrays(one, arrays) for one in value] if isinstance(value, list | tuple) else value
+
+
+_PLAIN = "biufU"  # kinds of arrays that are numbers, truths or text
+
+
+def _with_arrays(value: Any, arrays: bytes) -> Any:
+    """The same with each array in its place."""
+    if isinstance(value, dict):
+        if value.keys() != {_ARRAY}:
+            return {name: _with_arrays(one, arrays) for name, one in value.items()}
+        spelled, shape, first = value[_ARRAY]
+        kind = np.dtype(spelled)
+        if kind.kind not in _PLAIN or kind.itemsize == 0 or min([first, *shape]) < 0:
+            raise ValueError("no array of numbers or text")
+        return np.frombuffer(arrays, kind, math.prod(shape), first).reshape(shape).copy()
+    return [_with_arrays(one, arrays) for one in value] if isinstance(value, list) else value
 
 
 def _take_files(archive: SafeZip, document: Mapping[str, Any], folder: DataFolder) -> dict[str, str]:

@@ -53,22 +53,12 @@ def export(result: InWords, path: str | Path, configuration: Mapping[str, Any] |
         if view.made is not None:
             made = view.made
             sections.append(Section("How it was made", "made", of=lambda result: made(result, configuration or {})))
-        written = [_Written(one) for one in sections]
-        document.write(path, document.page(view.title(result), view.lead(result), written, result))
+        drawn = document.Figures()
+        written = [document.Written(one.title, one.anchor, markup(one.pieces(result), drawn)) for one in sections]
+        document.write(path, document.page(view.title(result), view.lead(result), written, drawn))
 
 
 # --- a section as HTML ------------------------------------------------------------------------------------------------
-
-
-class _Written(document.Section[Any]):
-    """A section of a view as a section of a report."""
-
-    def __init__(self, section: Section[Any]) -> None:
-        self.title, self.anchor, self._section = section.title, section.anchor, section
-
-    def body(self, subject: Any, figures: document.Figures) -> str:
-        """ "" where a result has nothing for any of its parts."""
-        return markup(self._section.pieces(subject), figures)
 
 
 def markup(pieces: Iterable[Piece], figures: document.Figures) -> str:

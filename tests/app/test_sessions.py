@@ -18,11 +18,15 @@ from ema_model.recordings import write_measurement
 from ema_model.simulation.run import Run, simulate_reference
 from emaviz.figures.identification import Row
 from emaviz.page.compare.tab import Asked
+from emaviz.page.compare.tab import kept as compare_kept
 from emaviz.page.playback import Looks
 from emaviz.page.runs import RunsTab
 from emaviz.session import session_file
+from emaviz.session.compare import Comparing
 from emaviz.session.data_folder import DataFolder
 from emaviz.session.discover.source import SavedStory
+from emaviz.session.explore import Session
+from emaviz.session.inputs import results_part
 from emaviz.session.session_file import Part
 from emaviz.session.settings import Settings, taken
 
@@ -162,6 +166,103 @@ def test_a_session_carries_its_files_to_another_folder(folder, tmp_path):
     assert len(list(folder.uploads.glob("*.csv"))) == 2, "what is there already is not kept twice"
 
 
+# --- a session brings its results as they were ------------------------------------------------------------------------
+
+
+@pytest.fixture
+def two_apps(tmp_path):
+    """One that saves and one that loads, in one data folder, without a screen."""
+    made = []
+
+    def new():
+        data = DataFolder(tmp_path / "data")
+        session = Session(load_actuator(), data.recordings)
+        made.append((session, Comparing(session, data)))
+        return made[-1][1]
+
+    yield new
+    for session, comparing in made:
+        comparing.close()
+        session.close()
+
+
+def parts_of(comparing):
+    return {
+        "comparison": compare_kept(comparing, lambda: None),
+        "results": results_part(lambda: {"c": comparing.provenance}),
+    }
+
+
+def compared_and_saved(comparing):
+    for name, duration_s in (("a", 0.05), ("b", 0.06)):
+        run = simulate_reference(Run(command("chirp", {}), duration_s), load_actuator(), HEALTHY)
+        write_measurement(run, comparing.folder.uploads / f"{name}.csv")
+        comparing.add(f"uploads/{name}.csv")
+    wait_until(lambda: len(comparing.opened) == 2)
+    comparing.hold_out("uploads/b.csv", True)
+    comparing.asking.ask(by_hand=True)
+    wait_until(lambda: comparing.finished is not None and not comparing.running)
+    path = comparing.folder.sessions / "whole.emaviz"
+    session_file.write_session(path, parts_of(comparing), comparing.folder, list(comparing.opened))
+    return path
+
+
+def test_a_session_brings_its_comparison_whole_and_nothing_is_computed_again(two_apps, monkeypatch):
+    first = two_apps()
+    path = compared_and_saved(first)
+
+    def refuses(*_, **__):
+        raise AssertionError("something is computed again")
+
+    monkeypatch.setattr("ema_model.comparison.compare", refuses)
+    second, shown = two_apps(), []
+    second.events.compared.connect(shown.append)
+    session_file.read_session(path, parts_of(second), second.folder)
+    found, was = second.comparison, first.comparison
+    assert shown == [found] and found is not was and not second.provenance.missing
+    assert not second.provenance.line(), "it is not out of date while its recordings are being read"
+    assert json.dumps(found.to_dict()) == json.dumps(was.to_dict()) and str(found) == str(was)
+    assert [str(one.to_json()) for one in found.figures()] == [str(one.to_json()) for one in was.figures()]
+    for own, its in zip((*found.recordings, *found.holdout), (*was.recordings, *was.holdout), strict=True):
+        assert own.measurement.samples == its.measurement.samples
+        for name in its.measurement:
+            np.testing.assert_array_equal(own.measurement[name], its.measurement[name])
+    wait_until(lambda: len(second.opened) == 2 and not second.asking.reading)
+    assert second.finished is found and not second.provenance.line()
+    second.asking.ask(by_hand=False)  # as the page does once the recordings are open
+    assert not second.job.waiting and not second.running and second.comparison is found
+
+
+@pytest.mark.parametrize("damage", ["before", "class", "field", "array", "shape"])
+def test_a_comparison_that_cannot_be_shown_is_to_be_computed_again(two_apps, damage):
+    """One of an older session, which says of what it was, and one that somebody has changed."""
+    first = two_apps()
+    path = compared_and_saved(first)
+    with zipfile.ZipFile(path) as archive:
+        files = {name: archive.read(name) for name in archive.namelist()}
+    document = json.loads(files["session.json"])
+    whole = document["results"]["c"]["whole"]
+    if damage == "before":
+        del document["results"]["c"]["whole"]
+    elif damage == "class":
+        whole["class"] = "Path"
+    elif damage == "field":
+        del whole["fields"]["over_floor"]
+    elif damage == "array":
+        whole["fields"]["over_floor"] = "1"
+    else:
+        whole["fields"]["recordings"][0]["fields"]["time_s"]["__array__"][1] = [10**12]
+    archive_with(path, {**files, "session.json": json.dumps(document)})
+    second = two_apps()
+    if damage == "shape":
+        with pytest.raises(InputError, match="is no session, or damaged"):
+            session_file.read_session(path, parts_of(second), second.folder)
+        return
+    session_file.read_session(path, parts_of(second), second.folder)
+    assert second.comparison is None and second.provenance.missing is not None
+    assert "whole.emaviz" not in second.provenance.line() and "a.csv" in second.provenance.line()
+
+
 def archive_with(path, files):
     with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as archive:
         for name, content in files.items():
@@ -279,12 +380,13 @@ def test_what_is_out_of_date_is_marked_and_what_a_session_lacks_is_named_in_its_
     page.get_by_text("lacking.emaviz is loaded:").wait_for()
     said = page.locator("div", has_text="lacking.emaviz is loaded:").last.locator("xpath=..").inner_text()
     assert "Identify. To be computed again: the answer of the sliders' plant" in said and "press Identify." in said
-    assert "Compare. Being computed again: this session's comparison of " in said and "Discover" not in said
-    for tab, line in (("Identify", "press Identify."), ("Compare", "Being computed again")):
-        page.get_by_role("tab", name=tab, exact=True).click()
-        page.get_by_role("status").filter(has_text=line).first.wait_for()
-    comparing.job.stop()
-    page.get_by_role("status").filter(has_text="press Compare.").get_by_role("button", name="Compute again").wait_for()
+    assert "Compare." not in said and "Discover" not in said, "the comparison itself is there"
+    page.get_by_role("tab", name="Identify", exact=True).click()
+    page.get_by_role("status").filter(has_text="press Identify.").first.wait_for()
+    wait_until(lambda: comparing.finished is not None and not comparing.asking.reading)
+    page.get_by_role("tab", name="Compare", exact=True).click()
+    page.get_by_role("button", name="Remove", exact=True).wait_for()
+    assert not page.get_by_role("status").filter(has_text="press Compare.").is_visible()
     comparing.calibrate = True
     identifying.clear()
 

@@ -20,8 +20,7 @@ from ema_model.simulation.run import Run
 from emaviz.cli import main
 from emaviz.recording import reproduce as recording
 from emaviz.recording.read import read
-from emaviz.report import reproduce as report
-from emaviz.report.reproduce import SECTIONS
+from emaviz.views import reproduce as report
 
 PLAN = """
 [runs.short]
@@ -106,7 +105,7 @@ def test_the_result_follows_from_the_rows(made):
 def test_the_report_holds_everything_and_asks_no_network(made):
     html = (made / "reproduce.html").read_text(encoding="utf-8")
     sections = re.findall(r'<section id="(\w+)">', html)
-    assert sections == [one.anchor for one in SECTIONS if one.anchor != "coefficients"]
+    assert sections == [one.anchor for one in report.VIEW.sections if one.anchor != "coefficients"]
     assert "0.69 ± 0.12" in html and "2709" in html  # T 5.1, T 5.11
     assert html.count("<tr><td") >= 33 + len(DEVIATIONS)
     assert "default-src 'none'" in html and "Nothing has been computed" not in html

@@ -11,11 +11,10 @@ from support.cheap_plans import written
 from ema_model.campaign import Store, load_plan
 from ema_model.campaign.kinds.discover import tally
 from ema_model.campaign.kinds.identify import covered
+from ema_model.campaign.result import Campaign, progress_table, report_text
 from ema_model.campaign.rows import common
 from ema_model.campaign.store import header_of, summaries
 from ema_model.faults import HEALTHY, NAMES
-from emaviz.report.campaign import write_campaign_report
-from emaviz.text.campaign import progress_table, report_text
 
 GROUPS = """
 [groups.found]
@@ -144,16 +143,16 @@ def test_an_interval_of_the_phase_goes_round():
 
 
 def test_markdown_tells_version_and_commit(store):
-    told = report_text(store)
+    told = report_text(Campaign(store))
     assert re.search(r"Made with emaviz \S+ \(commit \S+, sources [0-9a-f]{12}\), numpy ", told)
     assert "| found | k1=0.2 | 4 | 0 | 1.50 |" in told
     assert "- shown, , seed 1: FloatingPointError: it | diverged" in told or "seed 1: FloatingPointError" in told
-    assert "plan: done" in progress_table(store)
+    assert "plan: done" in progress_table(Campaign(store))
 
 
 def test_the_report_is_one_file_with_its_figures(store, tmp_path):
     path = tmp_path / "report.html"
-    write_campaign_report(store, path)
+    Campaign(store).export(path)
     text = path.read_text(encoding="utf-8")
     for anchor in ("tasks", "results", "distributions", "answers", "convergence", "errors", "effort"):
         assert f'<section id="{anchor}">' in text
@@ -170,10 +169,10 @@ def test_where_discovery_is_behind_stands_first(tmp_path):
         store.append(task.kind, [common(task) | how | ANSWER[task.kind](task, 0)])
     store.close()
     store = Store(tmp_path / "out")
-    told = report_text(store)
+    told = report_text(Campaign(store))
     assert "| 50 mrad (discover) | 70 mrad (bam_m3) | 40 mrad (bam_m1) |" in told  # of the group ahead
     assert "| behind | method discover | 1 | 0 | – | – | – | 25 mrad | 30 mrad | mesh_friction |" in told
-    write_campaign_report(store, tmp_path / "report.html")
+    Campaign(store).export(tmp_path / "report.html")
     text = (tmp_path / "report.html").read_text(encoding="utf-8")
     section = text[text.index('<section id="benchmarks">') :]
     section = section[: section.index("</section>")]
@@ -189,5 +188,5 @@ def test_an_empty_campaign_has_a_report(tmp_path):
     plan = load_plan(written(tmp_path, GROUPS))
     Store.writing(tmp_path / "out", header_of("T", "", plan.tasks), plan.text, plan.tasks).close()
     store = Store(tmp_path / "out")
-    write_campaign_report(store, tmp_path / "report.html")
-    assert "0 of 16 tasks have a row" in progress_table(store) and report_text(store)
+    Campaign(store).export(tmp_path / "report.html")
+    assert "0 of 16 tasks have a row" in progress_table(Campaign(store)) and report_text(Campaign(store))

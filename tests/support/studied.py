@@ -14,7 +14,7 @@ from typing import Any
 
 from ema_model.campaign import Store, load_plan, run_plan, scheduler
 from ema_model.campaign.kinds import KINDS
-from emaviz.text.campaign import report_text
+from ema_model.campaign.result import Campaign, report_text
 
 QUICK = os.environ.get("EMAVIZ_STUDY_QUICK") == "1"
 
@@ -33,7 +33,7 @@ def studied(plan: str) -> dict[str, list[dict[str, Any]]]:
     out = folder() / Path(plan).stem
     run_plan(loaded, out, scheduler(os.environ.get("EMAVIZ_STUDY_SCHEDULER"), None))
     store = Store(out)
-    print(f"\n{report_text(store)}")
+    print(f"\n{report_text(Campaign(store))}")
     rows = [row for kind in KINDS for row in store.table(kind).to_pylist()]
     failed = [f"{row['group']}, {row['case']}, seed {row['seed']}: {row['error']}" for row in rows if row["error"]]
     assert not failed, "\n".join(failed)

@@ -16,10 +16,10 @@ from emaviz.cli.ending import PartialAnswer
 from emaviz.cli.options import whole
 
 if TYPE_CHECKING:
-    from ema_model.campaign import Status, Store
+    from ema_model.campaign import Status
     from ema_model.campaign.plan import Plan
     from emaviz.cli import output
-    from emaviz.cli.documents import CampaignJson, PlannedJson
+    from emaviz.cli.documents import PlannedJson
 
 HELP = "compute the many tasks of a plan, in processes or on a Dask cluster; status and report of one"
 PLACE = 11
@@ -57,9 +57,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def documents() -> tuple[type, ...]:
     """What --json holds: of a campaign, and of what one would compute."""
-    from emaviz.cli.documents import CampaignJson, PlannedJson
+    from ema_model.campaign.result import Campaign
+    from ema_model.result import json_type
+    from emaviz.cli.documents import InterruptedCampaignJson, PlannedJson
 
-    return (CampaignJson, PlannedJson)
+    return (json_type(Campaign, InterruptedCampaignJson), PlannedJson)
 
 
 def run(arguments: argparse.Namespace) -> int:
@@ -81,8 +83,8 @@ def run(arguments: argparse.Namespace) -> int:
 
 def _run(plan: Plan, arguments: argparse.Namespace) -> int:
     from ema_model.campaign import Store, run_plan, scheduler
+    from ema_model.campaign.result import Campaign, interrupted
     from emaviz.cli import output
-    from emaviz.text.campaign import interrupted
 
     progress = output.Progress(arguments)
     progress.show("beginning")
@@ -97,14 +99,12 @@ def _run(plan: Plan, arguments: argparse.Namespace) -> int:
         with suppress(InputError):  # there is no folder yet
             store = Store(arguments.out)
             print(interrupted(store), flush=True)
-            so_far = _numbers(store)
-            so_far["interrupted"] = True
-            output.write_json(arguments, so_far)
+            output.write_json(arguments, {**Campaign(store).to_dict(), "interrupted": True})
         raise
     finally:
         progress.done()
     print(_ended(status, arguments.out))
-    output.write_json(arguments, _numbers(Store(arguments.out)))
+    output.write_json(arguments, Campaign(Store(arguments.out)).to_dict())
     return 0
 
 
@@ -157,33 +157,22 @@ def _dry_run(plan: Plan, arguments: argparse.Namespace) -> int:
 
 def _status(arguments: argparse.Namespace) -> int:
     from ema_model.campaign import Store
+    from ema_model.campaign.result import Campaign, progress_table
     from emaviz.cli import output
-    from emaviz.text.campaign import progress_table
 
-    store = Store(arguments.folder)
-    print(progress_table(store))
-    output.write_json(arguments, _numbers(store))
+    found = Campaign(Store(arguments.folder))
+    print(progress_table(found))
+    output.write_json(arguments, found.to_dict())
     return 0
 
 
 def _report(arguments: argparse.Namespace) -> int:
     from ema_model.campaign import Store
+    from ema_model.campaign.result import Campaign, report_text
     from emaviz.cli import output
-    from emaviz.report.campaign import write_campaign_report  # plotly takes a second to import
-    from emaviz.text.campaign import report_text
 
-    store = Store(arguments.folder)
-    print(report_text(store))
-    path = Path(arguments.folder) / "report.html"
-    write_campaign_report(store, path)
-    output.write_json(arguments, _numbers(store))
+    found = Campaign(Store(arguments.folder))
+    print(report_text(found))
+    found.export(Path(arguments.folder) / "report.html")
+    output.write_json(arguments, found.to_dict())
     return 0
-
-
-def _numbers(store: Store) -> CampaignJson:
-    return {
-        "title": store.header.title,
-        "version": store.header.version,
-        "commit": store.header.commit,
-        "groups": store.progress(),
-    }

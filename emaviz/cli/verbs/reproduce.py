@@ -42,10 +42,10 @@ def run(arguments: argparse.Namespace) -> int:
     from ema_model.actuator import load_actuator
     from ema_model.campaign import Store, load_plan, run_plan, scheduler
     from ema_model.campaign.plan import plan_path
+    from ema_model.campaign.result import interrupted
     from ema_model.campaign.thesis import Evaluation, drawn
     from ema_model.campaign.thesis_words import aligned, answer, short_table
     from emaviz.cli import output
-    from emaviz.text.campaign import interrupted
 
     plan = load_plan(plan_path(arguments.plan or ("thesis_quick" if arguments.quick else "thesis")))
     if "identify" not in {task.kind for task in plan.tasks}:
@@ -63,16 +63,12 @@ def run(arguments: argparse.Namespace) -> int:
             with suppress(InputError):  # there is no folder yet
                 print(interrupted(Store(arguments.out)), flush=True)
             raise
-        found = Evaluation(Store(arguments.out))
         progress.show("simulating the responses")
-        responses = drawn(load_actuator())
+        found = Evaluation(Store(arguments.out), drawn(load_actuator()))
         progress.show("writing the report and the recording")
         folder = Path(arguments.out)
-        from emaviz.recording.reproduce import write_reproduction  # rerun takes a second to import
-        from emaviz.report.reproduce import write_reproduction_report  # plotly takes a second to import
-
-        write_reproduction_report(found, responses, folder / REPORT)
-        write_reproduction(found, responses, folder / RECORDING)
+        for name in (REPORT, RECORDING):
+            found.export(folder / name)
     finally:
         progress.done()
     output.write_json(arguments, found.to_dict())

@@ -304,6 +304,22 @@
     bar.style.right = `${innerWidth - edge.right + 54}px`;
   };
 
+  // --- the play-head: an upright line in the charts of tabs whose moment the app tells.  It is no rule of a style sheet:
+  //     where one changes, several times a second, the browser looks at the whole page again, and draws fewer poses ---
+  const heads = () => {
+    const share = document.querySelector('.emaviz-play-head')?.dataset.share ?? '';
+    for (const mark of document.querySelectorAll('.emaviz-time')) {
+      for (const over of mark.parentElement.parentElement.querySelectorAll('.u-over')) {
+        const one = over.querySelector(':scope > .emaviz-play-line') ?? make('play-line', over);
+        if (one.dataset.share === share) continue;
+        one.dataset.share = share;
+        one.style.left = `${share}%`;
+        one.style.display = share ? '' : 'none';
+      }
+    }
+  };
+  const playing = setInterval(heads, 60);
+
   const key = (event) => { if (event.key === 'Escape' && cursors.a !== null) clear(); };
   let seen = null;
   const timer = setInterval(() => {
@@ -331,6 +347,7 @@
   window.emavizMeasure = { cursors: () => [cursors.a, cursors.b], end: () => {
     heard.abort();
     clearInterval(timer);
-    document.querySelectorAll('[class^=emaviz-measure]').forEach(one => one.remove());
+    clearInterval(playing);
+    document.querySelectorAll('[class^=emaviz-measure], .emaviz-play-line').forEach(one => one.remove());
   } };
 })();

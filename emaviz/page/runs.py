@@ -188,7 +188,7 @@ class RunsResult:
             '<div style="padding:0 10px 4px;font-size:12px;overflow-wrap:anywhere"><b>{}</b> · '
             '<a href="{}" target="_blank" rel="noopener">in a tab of its own ↗</a></div>'
             '<iframe class="emaviz-rerun" src="{}" title="Rerun viewer" '
-            'style="width:100%;height:calc(100vh - 240px);border:0"></iframe>',
+            'style="width:100%;height:calc(100vh - 205px);border:0"></iframe>',
             name,
             url,
             url,

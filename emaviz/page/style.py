@@ -169,13 +169,10 @@ def caption(text: str) -> Html:
 
 
 def play_head(share: float | None) -> Html:
-    """An upright line in every chart over time, at a share of its width; None for none."""
+    """Tells `measure.js` where the upright line stands in every chart over time, a share of its width; None: none."""
     if share is None or not 0.0 <= share <= 1.0:
         return Html()
-    return unescaped(
-        "<style>div:has(> div > .emaviz-time) .u-over::after{content:'';position:absolute;top:0;bottom:0;"
-        f"left:{100.0 * share:.2f}%;width:1.5px;background:currentColor;opacity:.65;pointer-events:none}}</style>"
-    )
+    return html('<i class="emaviz-play-head" data-share="{}"></i>', f"{100.0 * share:.2f}")
 
 
 def figures(dark: bool) -> Html:

@@ -21,6 +21,7 @@ from emaviz.recording.style import (
     ANSWER,
     APPLICATION,
     COMPARISON,
+    DASHBOARD_TITLES,
     GROUPS,
     ITERATION,
     K_NAMES,
@@ -248,7 +249,7 @@ def _identification(contents: Contents) -> rrb.Blueprint:
 
 
 def _dashboard(contents: Contents) -> rrb.Container:
-    """Measured and model of the iteration that is chosen, convergence, all k, and the answer in words."""
+    """Measured and model of the iteration that is chosen, the answer in words, convergence, all k in four columns."""
     names = list(contents.algorithms)
     fits = [
         view(
@@ -260,13 +261,12 @@ def _dashboard(contents: Contents) -> rrb.Container:
         )
         for signal in contents.charts
     ]
-    convergence = _convergence(names, legend=len(names) > 1, falls=True)
     kinds = ["best", "interval"]
     kinds += ["truth"] if contents.truth else []
     kinds += ["population"] if len(names) == 1 else []  # of several it would hide all else
     views = [
         plot(
-            K_TITLES[k],
+            DASHBOARD_TITLES[k],
             [f"{algorithm_path(name)}/{kind}/{k}" for name in names for kind in kinds],
             legend=False,
             linked=False,
@@ -274,13 +274,15 @@ def _dashboard(contents: Contents) -> rrb.Container:
         )
         for k in K_NAMES
     ]
-    right: list[rrb.Container | rrb.View] = [rrb.Grid(*views, grid_columns=2)]
+    right: list[rrb.Container | rrb.View] = [_convergence(names, legend=len(names) > 1, falls=True)]
     if contents.answer:
         right.insert(0, rrb.TextDocumentView(origin=ANSWER, name="The answer"))
-    return rrb.Horizontal(
-        rrb.Vertical(*fits, convergence, row_shares=[3.0] * len(fits) + [2.0]),
-        rrb.Vertical(*right, row_shares=[3.0, 5.0][-len(right) :]),
-        column_shares=[5, 4],
+    return rrb.Vertical(
+        rrb.Horizontal(
+            rrb.Vertical(*fits), rrb.Vertical(*right, row_shares=[3.0, 2.0][-len(right) :]), column_shares=[5, 4]
+        ),
+        rrb.Grid(*views, grid_columns=4),
+        row_shares=[2.0, 1.0],
         name="Identification",
     )
 
@@ -392,7 +394,7 @@ def _convergence(names: Iterable[str], *, legend: bool = False, falls: bool = Fa
     """The best error of each iteration; the corrected one takes the other's place once it is there."""
     kinds = ("log10_rmse", "log10_corrected_error")
     paths = [f"{algorithm_path(name)}/{kind}" for name in names for kind in kinds]
-    title = "Convergence: log10 of the error [A], corrected at the end"
+    title = "Convergence: log10 of error [A]"
     return plot(title, paths, legend=legend, linked=False, falls=falls)
 
 

@@ -23,6 +23,8 @@ SIM_TIME = "sim_time"
 ITERATION = "iteration"
 K_NAMES = tuple(fault.name for fault in FAULTS)
 K_TITLES = {fault.name: f"{fault.name} {fault.title[0].lower()}{fault.title[1:]} [-]" for fault in FAULTS}
+# Beside a view's title stand buttons: four views in a line leave it two dozen letters where the app holds the viewer.
+DASHBOARD_TITLES = {name: title.removesuffix(" [-]") for name, title in K_TITLES.items()}
 
 COMPARISON = "/comparison"
 ANSWER = "/answer"

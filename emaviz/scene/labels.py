@@ -242,11 +242,15 @@ class Labels:
             for name in self._handles.keys() - {one.label.name for one in placed}:
                 self._put(name, "", (0.0, 0.0, 0.0), False, visible=False)
             for one in placed:
-                x, y = 2.0 * one.middle / self._picture - 1.0
-                right, back, up = (float(part) for part in self._frame.at(x, -y, one.depth))
+                right, back, up = (float(part) for part in self._at(one))
                 self._put(one.label.name, one.label.text, (right, back, up), one.label.callout, visible=True)
             for callout, colour, thickness in ((True, FAULT, 2.0), (False, SATIN, 1.0)):
                 self._lead([one for one in placed if one.label.callout == callout], colour, thickness)
+
+    def _at(self, one: Placed) -> NDArray[np.float64]:
+        """Where in the scene its middle is seen (3,)."""
+        x, y = 2.0 * one.middle / self._picture - 1.0
+        return self._frame.at(x, -y, one.depth)
 
     def _lay_out(self, labels: list[Label]) -> list[Placed]:
         """Only where their sizes have changed: a slider that is dragged mostly changes digits."""
@@ -280,15 +284,17 @@ class Labels:
             handle.visible = visible
 
     def _lead(self, placed: list[Placed], colour: tuple[int, int, int], thickness: float) -> None:
-        """Lines from labels to their places, where these are not close by."""
+        """Lines from labels to their places, where these are not close by.
+
+        They end below the middle of a label: however somebody turns the actuator, its text stays at its line.
+        """
         name = f"{self._root}/lines_{thickness:g}"
         points = []
         for one in placed:
             box = one.box()
             edge = np.clip(one.target, box[:2], box[2:])
             if np.hypot(*(edge - one.target)) >= _LEADER_PX or one.label.callout:
-                x, y = 2.0 * edge / self._picture - 1.0
-                points.append([self._frame.at(x, -y, one.depth), one.label.place])
+                points.append([self._at(one), one.label.place])
         lines = np.array(points, np.float32).reshape(-1, 2, 3)
         if self._sent.get(name, (b"",)) == (lines.tobytes(),):
             return

@@ -21,7 +21,7 @@ from ema_model.identification.run import warm_up
 from ema_model.identification.search import Objective
 from ema_model.recordings import Measurement
 from ema_model.simulation import plant
-from ema_model.simulation.run import simulate_monitor, simulate_monitors
+from ema_model.simulation.run import Run, simulate_monitor, simulate_monitors
 from emaviz.session.identify import Identifying, inputs_of
 from emaviz.session.inputs import Inputs
 from emaviz.session.jobs import Signal, Worker, report
@@ -98,6 +98,7 @@ class Session:
         self.plants: dict[str, Actuator] = {OWN_PLANT: actuator}  # that may play the plant, by what they are
         self.plant = OWN_PLANT
         self.simulation: Simulation | None = None
+        self._monitored: tuple[object, Measurement] | None = None  # the monitor model's last run, and what it was of
         self.ready = threading.Event()
         self.open_file: Callable[[str], Measurement] = _no_files  # by the name of a file in the data folder
         self.worker = Worker("emaviz-compute", self._on_error)
@@ -181,7 +182,7 @@ class Session:
                 start_speed_rad_s=settings.start_speed_rad_s,
                 start_play_rad=settings.start_play_rad(actuator),
             )
-            monitor = simulate_monitor(run, self.actuator, shown, start_rad=start)
+            monitor = self._monitor(run, shown, start)
         except FloatingPointError as error:
             raise InputError(str(error)) from None
         elapsed = time.perf_counter() - started
@@ -193,6 +194,13 @@ class Session:
             reference, monitor, settings.k, elapsed, settings.command, model, "" if name == OWN_PLANT else name
         )
         self.events.simulated(self.simulation)
+
+    def _monitor(self, run: Run, k: NDArray[np.float64], start_rad: float) -> Measurement:
+        """The monitor model's run, which is simulated once as long as a slider moves nothing but the plant."""
+        asked = run, start_rad, tuple(k)
+        if self._monitored is None or self._monitored[0] != asked:
+            self._monitored = asked, simulate_monitor(run, self.actuator, k, start_rad=start_rad)
+        return self._monitored[1]
 
     def _warm_up(self) -> None:
         started = time.perf_counter()

@@ -14,6 +14,7 @@ from ema_model.actuator import load_actuator
 from ema_model.discovery.result import Experiment
 from ema_model.effects.user import user_torque
 from ema_model.errors import InputError
+from emaviz.session.discover.history import WHOLE, Entries
 from emaviz.session.discover.source import agrees, document_of, sensors_of, truth_of
 from emaviz.session.settings import Settings
 
@@ -55,6 +56,21 @@ def solved(rigs):
     here.discovering.add_own(user_torque("c*omega"), {"c": 1e-5})
     here.done()
     return here
+
+
+def test_of_many_discoveries_the_last_ones_are_whole(solved):
+    """What one has scored takes 150 MB: of those before there are the steps, taken again when one is shown."""
+    now, entries = solved.discovering.entries.current, Entries(solved.discovering.source)
+    words = []
+    for _ in range(WHOLE + 2):
+        entries.begin(now.told).look = now.look
+        words.append(entries.current.words)
+    assert [one.told is None for one in entries.all] == [True, True] + WHOLE * [False]
+    assert [one.words for one in entries.all] == words, "they are told as before"
+    assert len(entries.all[0].saved().steps) == len(now.saved().steps) == 2
+    entries.show(entries.all[2])
+    entries.begin(now.told)
+    assert [one.told is None for one in entries.all] == [True, True, False, True, False, False]
 
 
 def ladder(rig):

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import math
 
 import numpy as np
@@ -345,18 +344,16 @@ def test_the_first_visit_is_greeted_once(app, browser):
 def test_the_play_head_is_the_same_moment_everywhere(page, app):
     app.strip.play(False)
     app.playback.seek(0.2)
-    read = """() => [...document.querySelectorAll('.u-over')].map(e => {
-        const after = getComputedStyle(e, '::after');
-        return [e.clientWidth, after.content, parseFloat(after.left)]; })"""
-    wait_until(lambda: any(line[1] != "none" and line[0] for line in page.evaluate(read)))
-    page.wait_for_timeout(300)
-    heads = [line for line in page.evaluate(read) if line[0] and line[1] != "none"]
-    assert len(heads) == 4, json.dumps(heads)
-    assert all(left / width == pytest.approx(0.4, abs=0.005) for width, _, left in heads)
+    read = """() => [...document.querySelectorAll('.u-over')].filter(e => e.clientWidth).flatMap(e =>
+        [...e.querySelectorAll('.emaviz-play-line')].filter(one => one.checkVisibility())
+          .map(one => one.offsetLeft / e.clientWidth))"""
+    wait_until(lambda: page.evaluate(read) == [pytest.approx(0.4, abs=0.005)] * 4)
+    app.playback.seek(0.1)
+    wait_until(lambda: page.evaluate(read) == [pytest.approx(0.2, abs=0.005)] * 4)
     page.get_by_role("tab", name="Identify").click()
     page.get_by_text("Nothing is identified yet").wait_for()
     app.tab(IdentifyTab).result._show_search()
     page.get_by_text("Convergence").wait_for()
     page.wait_for_timeout(300)
-    assert not [line for line in page.evaluate(read) if line[0] and line[1] != "none"], "not over iterations"
+    assert not page.evaluate(read), "not over iterations"
     app.strip.play(True)

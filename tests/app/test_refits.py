@@ -45,6 +45,9 @@ def test_candidates_are_shown_as_algebra_ranks_them_and_again_as_each_is_refitte
     algebra, refitted = ranked[0].predicted_rmse(first), ranked[-1].predicted_rmse(best)
     assert refitted == ranked[-1].assessment.refitted[best.name] == pytest.approx(algebra, rel=0.25)
     assert "refitted" in candidate.fall(ranked[-1], best) and "≈" in candidate.fall(ranked[0], first)
+    improbable = [one for one in ranked[-1].promising if ranked[-1].probability(one) < 0.01]
+    assert candidate.chance(ranked[-1], best) == "> 99.9 % probable" and improbable
+    assert {candidate.chance(ranked[-1], one) for one in improbable} == {"not the next"}, "whatever it would take away"
     assert "Ranked by algebra" in candidate.how_known(ranked[0], True)
     assert "Ranked by refits" in candidate.how_known(ranked[-1], False)
 

@@ -275,6 +275,19 @@ def test_labels_do_not_cover_each_other(scene, actuator, faults):
         assert len(placed) >= (len(said) if picture[0] > 550 and len(faults) < 2 else 0.6 * len(said))
 
 
+def test_a_label_stays_at_its_line_however_the_actuator_is_turned(scene, actuator):
+    """A line that ends at the middle of a text ends there from every side; at its edge, from the first one alone."""
+    motion(*run_of(actuator, k1=0.7, k2=0.7, k3=0.7), actuator).damage(scene)
+    labels = scene._labels
+    ends = [end for lines in labels._lines.values() if lines is not None for end in lines.points[:, 0]]
+    middles = np.array(
+        [labels._handles[name].position for name, sent in labels._sent.items() if name in labels._handles]
+    )
+    assert len(ends) >= 5
+    for end in ends:
+        assert np.abs(middles - end).max(axis=1).min() < 1e-5
+
+
 def resting_for(growing, seconds):
     """Whether a list stays as long as it is."""
     length = len(growing)

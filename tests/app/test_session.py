@@ -12,7 +12,7 @@ import pytest
 
 from ema_model.actuator import load_actuator
 from emaviz.recording import RecordingError, read
-from emaviz.session.explore import Session
+from emaviz.session.explore import Session, Simulation
 
 
 @pytest.fixture
@@ -108,3 +108,27 @@ def test_a_diverging_model_is_told_and_the_session_goes_on(session, monkeypatch)
 def test_reading_what_is_no_recording_is_told(tmp_path):
     with pytest.raises(RecordingError):
         read(tmp_path / "none.rrd")
+
+
+def test_the_monitor_is_simulated_once_while_sliders_move_the_plant_alone(session):
+    runs: list[Simulation] = []
+    came = threading.Event()
+    session.events.simulated.connect(lambda one: (runs.append(one), came.set()))
+
+    def simulated():
+        came.clear()
+        session.refresh()
+        assert came.wait(60.0)
+        return runs[-1]
+
+    first = simulated()
+    session.settings.set_fault(0, 0.4)
+    second = simulated()
+    assert second.monitor is first.monitor and second.reference is not first.reference
+    session.settings.set("monitor", "same faults")
+    third = simulated()
+    assert not np.array_equal(third.monitor["current_A"], first.monitor["current_A"])
+    session.settings.set_command_setting("chirp", "amplitude_rad", 0.003)
+    assert not np.array_equal(simulated().monitor["command_rad"], third.monitor["command_rad"])
+    session.settings.set("load_torque_Nm", 5.0)
+    assert "load_torque_Nm" in simulated().monitor

@@ -8,7 +8,7 @@ import rerun.blueprint as rrb
 from rerun.chunk import RrdReader
 
 from emaviz.recording import RecordingWriter
-from emaviz.recording.blueprint import POINTS, Chart, Contents, axes_path, build, fit_path, plot, view
+from emaviz.recording.blueprint import POINTS, Algorithm, Chart, Contents, axes_path, build, fit_path, plot, view
 
 TIME = np.linspace(0.0, 0.5, 5001)
 CURRENT = 4.0 * np.sin(40.0 * TIME)
@@ -60,6 +60,28 @@ def test_it_opens_on_one_dashboard_at_the_last_iteration(written):
 def test_a_dashboard_is_as_light_or_dark_as_the_viewer():
     shown = view("current", ["/curves/current_A/**"])
     assert "Background" not in shown.properties and "VisualBounds2D" in shown.properties
+
+
+WIDE_PX, BESIDE_PX, LETTER_PX = 1000.0, 115.0, 5.9  # of the viewer in the app; a title's icon and buttons; a letter
+
+
+def _titles(part, wide_px):
+    """Every view's title, with the px that its place leaves it."""
+    if not isinstance(part, rrb.Container):
+        yield str(part.name), wide_px - BESIDE_PX
+        return
+    for i, one in enumerate(part.contents):
+        share = {"Horizontal": part.column_shares, "Grid": [1.0] * (part.grid_columns or 1)}.get(type(part).__name__)
+        yield from _titles(one, wide_px * (share[i % len(share)] / sum(share) if share else 1.0))
+
+
+def test_titles_of_the_dashboard_are_whole_where_the_app_shows_it():
+    chart = Chart.of("current_A", TIME, CURRENT)
+    algorithms = {name: Algorithm(iterations=True) for name in RACE}
+    held = Contents(charts={"current_A": chart}, algorithms=algorithms, answer=True, truth=True)
+    titles = list(_titles(build(held).root_container.contents[0], WIDE_PX))
+    assert {"The answer", "k3 short circuit A", "k8 proportional gain"} <= {title for title, _ in titles}
+    assert [title for title, px in titles if LETTER_PX * len(title) > px] == []
 
 
 def test_what_was_not_recorded_has_no_view():

@@ -120,6 +120,7 @@ def style(look: Look | None, shown: Sequence[tuple[str, Candidate | None]], open
 # --- the candidates that are worth a refit, large, in the order in which they are probable ----------------------------
 
 MOST = 8  # cards
+_UNLIKELY = 0.01  # a probability below which another candidate is the next
 _BUTTON = (
     "font:inherit;color:inherit;cursor:pointer;border-radius:4px;border:1px solid rgba(134,142,150,.6);background:none;"
 )
@@ -152,7 +153,8 @@ _SMALL = "opacity:.8;font-size:12px;padding-bottom:5px"
 _LEGEND = html(
     '<div style="opacity:.8;font-size:12px;padding-bottom:5px"><span style="color:{}">●</span> what the model lacks, '
     '<span style="color:{}">━</span> the candidate\'s signature: where they lie together, this is it. Bar: how '
-    "probable it is that this, of all candidates, is missing.</div>",
+    "probable it is that this, of all candidates, is the next to add, by how well it fits and what that takes, not by "
+    "the fall alone. Each addition ranks the others anew.</div>",
     discovery.RESIDUAL,
     discovery.SIGNATURE,
 )
@@ -256,7 +258,7 @@ class Cards:
     def _card(self, look: Look, place: int, one: Candidate) -> Html:
         if one.name not in self._sketches:
             self._sketches[one.name] = discovery.sketch(discovery.signature(look, one))
-        title, probable, slot = effect_title(one.name), look.probability(one), self._slots[one.name]
+        title, slot = effect_title(one.name), self._slots[one.name]
         same = look.assessment.alike.get(one.name, ()) if look.assessment else ()
         rivals = ", ".join(in_sentence(effect_title(name)) for name in same)
         against = look.assessment.spoken_against.get(one.name, "") if look.assessment else ""
@@ -264,15 +266,15 @@ class Cards:
         opens = f"{_PRESS.format(id_of(self._opens[slot]))};{_SEE}"
         return html(
             '<article class="emaviz-card{}"><header><button onclick="{}" title="Its equation, cause, and what it is '
-            'mistaken for">{}. {}</button><b>{} probable</b></header><i><i style="width:{:.1f}%;height:4px"></i></i>'
+            'mistaken for">{}. {}</button><b>{}</b></header><i><i style="width:{:.1f}%;height:4px"></i></i>'
             '<div>{}{}{}<button class="do add" onclick="{}" aria-label="Add {}"{}>+ Add</button>'
             '<button class="do" onclick="{}" aria-label="Why {}">Why?</button></div>{}</article>',
             " open" if one.name == self._opened else "",
             opens,
             place + 1,
             title,
-            in_percent(probable),
-            100.0 * probable,
+            chance(look, one),
+            100.0 * look.probability(one),
             joined(
                 html("<div>{}</div>", line)
                 for line in (explained(fall(look, one)), strength(look, one), share(look, one))
@@ -286,6 +288,12 @@ class Cards:
             title,
             self._sketches[one.name],
         )
+
+
+def chance(look: Look, one: Candidate) -> str:
+    """Of a candidate beside the others: that it is not the next says nothing of whether it is missing at all."""
+    probable = look.probability(one)
+    return f"{in_percent(probable)} probable" if probable >= _UNLIKELY else "not the next"
 
 
 def how_known(look: Look, refining: bool) -> Html:

@@ -292,13 +292,20 @@ class Entry:
         return f"{self.number} · {self.subject} · {self.result} · {self.at:%H:%M}"
 
 
+WHOLE = 3  # discoveries that are gone back to without computing: what each has scored takes 150 MB
+
+
 class Entries:
-    """The discoveries, the oldest first, and which one is shown."""
+    """The discoveries, the oldest first, and which one is shown.
+
+    Those shown last are whole; of the others there is what a session's file has, and their steps are taken again.
+    """
 
     def __init__(self, source: DiscoverySource) -> None:
         self._source = source
         self.all: list[Entry] = []
         self.current: Entry | None = None
+        self._whole: list[Entry] = []  # the one shown last is the last
 
     def begin(self, told: Telling) -> Entry:
         """A new one, or the one that was brought and is taken again now, is shown."""
@@ -308,8 +315,17 @@ class Entries:
             entry = self._new(told.recipe)
         entry.told, entry.look, entry.brought, entry.revealed = told, None, None, False
         entry.challenge = self._source.challenge
-        self.current = entry
+        self.show(entry)
         return entry
+
+    def show(self, entry: Entry) -> None:
+        """One that is whole is shown."""
+        self.current = entry
+        self._whole = [*(one for one in self._whole if one is not entry and one.told is not None), entry]
+        for one in self._whole[:-WHOLE]:
+            one.brought = one.saved()
+            one.told = one.look = None
+        self._whole = self._whole[-WHOLE:]
 
     def bring(self, saved: SavedStory) -> Entry:
         """One of a session's file."""
@@ -354,7 +370,8 @@ class Shown:
 
     def recall(self, entry: Entry) -> None:
         """A story as it was left, at once."""
-        self._entries.current, self.told, self.look = entry, entry.told, entry.look
+        self._entries.show(entry)
+        self.told, self.look = entry.told, entry.look
         self._looked(self.look)
 
     def begin(self, recipe: Recipe, tell: Tell, compared: Comparison | None = None) -> Telling:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import shutil
 
+import msgspec
 import numpy as np
 import pytest
 from support.on_page import wait_until
@@ -68,6 +69,11 @@ def test_of_many_discoveries_the_last_ones_are_whole(solved):
     assert [one.told is None for one in entries.all] == [True, True] + WHOLE * [False]
     assert [one.words for one in entries.all] == words, "they are told as before"
     assert len(entries.all[0].saved().steps) == len(now.saved().steps) == 2
+    brought = [entries.bring(one.saved()) for one in (entries.all[0], entries.all[-1])]
+    assert len(entries.all) == WHOLE + 2 and set(brought) <= {*entries.all}, (
+        "a session that is loaded where it was saved"
+    )
+    assert entries.bring(msgspec.structs.replace(now.saved(), says="another")) is entries.all.pop()
     entries.show(entries.all[2])
     entries.begin(now.told)
     assert [one.told is None for one in entries.all] == [True, True, False, True, False, False]

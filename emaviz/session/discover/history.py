@@ -328,7 +328,9 @@ class Entries:
         self._whole = self._whole[-WHOLE:]
 
     def bring(self, saved: SavedStory) -> Entry:
-        """One of a session's file."""
+        """One of a session's file; it may be here."""
+        if known := next((one for one in self.all if one.saved() == saved), None):
+            return known
         entry = self._new(saved.recipe)
         entry.brought = saved
         return entry

@@ -168,6 +168,7 @@ class Search:
         self._exchanges: set[tuple[str, str]] = set()  # that were tried
         self._barred: set[str] = set()  # effects that were added, and spoken against once all was there
         self._ways: list[Way] = []  # not gone yet
+        self._prior = -math.inf  # logarithm of the odds that one of the Terms is missing, as of the last round
 
     # --- whether a closed loop is worth a search ----------------------------------------------------------------------
 
@@ -204,8 +205,12 @@ class Search:
         if unknown is not None and not story.named:
             unknown = _with_curve(story, self._curve, unknown, tell)
         story.settle(tell)  # last: beside a settled model any refit falls that only goes back to the sensors' noise
-        while story.named and story.ladder[-1].change.kind == "effect" and not _falls(story):
-            self._take_back(story.added[-1], _IDLE)
+        while story.named and story.ladder[-1].change.kind == "effect":
+            last = story.added[-1]
+            reason = _IDLE if not _falls(story) else _SLIGHT if self._is_slight(last) else ""
+            if not reason:
+                break
+            self._take_back(last, reason)
             unknown = story.left().explanation
         first = [replace(one, probability=None) if one.name in self._barred else one for one in self._first]
         first.sort(key=lambda one: -(one.probability or 0.0))
@@ -228,7 +233,9 @@ class Search:
 
     def _round(self) -> Round:
         """All Terms beside the last model."""
-        return self._rounds.beside(self.story, self._tell)
+        seen = self._rounds.beside(self.story, self._tell)
+        self._prior = seen.prior
+        return seen
 
     def _contenders(self) -> list[Contender]:
         """The few Terms that might be the best beside the last model, refitted, the most probable first."""
@@ -371,7 +378,8 @@ class Search:
         branch = replace(story, steps=story.steps[: place + 1], ties={}, refused={}, warnings=[])
         branch.add(way.trial)
         branch.finish(self._tell)
-        other = Search(branch, self._names, self._most, self._tell, self._rounds.elsewhere())
+        most = min(self._most, 1 + len({one.name for one in story.added}))
+        other = Search(branch, self._names, most, self._tell, self._rounds.elsewhere())
         other._barred = {*self._barred}
         other._go_to_the_end()
         if not branch.added:
@@ -452,13 +460,14 @@ class Search:
 
     def _slight(self) -> bool:
         """Goes back to before an effect that tells too little beside what is left, however long that was recorded."""
-        story = self.story
-        prior = self._round().prior
-        for one in story.added:
-            if one.name in CATALOGUE and _shapes_told(story, one) + prior < NAMED:
+        for one in self.story.added:
+            if self._is_slight(one):
                 self._take_back(one, _SLIGHT)  # what is less probable beside the same model tells no more
                 return True
         return False
+
+    def _is_slight(self, one: Added) -> bool:
+        return one.name in CATALOGUE and _shapes_told(self.story, one) + self._prior < NAMED
 
     def _take_back(self, one: Added, reason: str) -> None:
         """Goes back to before an effect, which is not looked at again."""

@@ -233,9 +233,7 @@ class Search:
 
     def _round(self) -> Round:
         """All Terms beside the last model."""
-        seen = self._rounds.beside(self.story, self._tell)
-        self._prior = seen.prior
-        return seen
+        return self._rounds.beside(self.story, self._tell)
 
     def _contenders(self) -> list[Contender]:
         """The few Terms that might be the best beside the last model, refitted, the most probable first."""
@@ -460,6 +458,7 @@ class Search:
 
     def _slight(self) -> bool:
         """Goes back to before an effect that tells too little beside what is left, however long that was recorded."""
+        self._prior = self._round().prior
         for one in self.story.added:
             if self._is_slight(one):
                 self._take_back(one, _SLIGHT)  # what is less probable beside the same model tells no more

@@ -8,11 +8,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ema_model.discovery.criteria import ANY_MISSING, AS_WELL, NAMED
+from ema_model.discovery.criteria import ANY_MISSING, AS_WELL, FAR, HALF, NAMED
 from ema_model.discovery.evidence import evidence_of, gains_of
 from ema_model.discovery.fingerprints import Fingerprint, fingerprints
 from ema_model.discovery.history import Story
 from ema_model.discovery.refit import Trial
+from ema_model.discovery.remaining import ratio
 from ema_model.discovery.result import Candidate
 from ema_model.discovery.scoring import AboutFit, Evident, ScoredTerm, evidence_of_fit, scored_terms
 from ema_model.discovery.terms import Term, hidden, noise_of, terms_of
@@ -97,6 +98,7 @@ class Rounds:
         self._names = candidates
         self._last: tuple[Fit, Data | None, Round] | None = None  # with what was held out
         self._made: list[Term] = []  # all Terms of effects, beside an earlier model
+        self._left = math.inf  # floors, by that model
         self._hidden: Sequence[Candidate] = ()
 
     def beside(self, story: Story, tell: Progress = lambda text: None) -> Round:
@@ -113,22 +115,25 @@ class Rounds:
     def elsewhere(self) -> Rounds:
         """Rounds of another story of the same recordings, which begin with what these know."""
         other = Rounds(self._names)
-        other._made, other._hidden = self._made, self._hidden
+        other._made, other._left, other._hidden = self._made, self._left, self._hidden
         return other
 
     def _terms(self, story: Story, noise: NoiseModel) -> list[Term]:
         """The Terms beside the last model: the first time all of them, then anew those that might tell most.
 
-        What a Term changes depends little on what else is in the model: enough to know which are hopeless.
+        What a Term changes depends little on what else is in the model, enough to know which are hopeless, unless the
+        motion is another one: where the model left much, and leaves half of that.
         """
         found, known, shown = story.current, self._made, story.left().orders
-        are_of_this = known and len(known[0].columns) == len(found.residual)
+        left = ratio(story.data, found)
+        moves_alike = self._left <= FAR or left >= HALF * self._left
+        are_of_this = known and moves_alike and len(known[0].columns) == len(found.residual)
         if not are_of_this or found.actuator.axes.motor == "linear":  # whose orders are the residual's
             prints, barred = story.fingerprints(self._names or None)
             unseen = [Candidate(name, 0.0, {}, reason) for name, reason in hidden(found, prints).items()]
             self._hidden = [*unseen, *barred]
             terms = terms_of(story.data, found, [*prints, *_further_orders(story, shown)], noise, shown)
-            self._made = [one for one in terms if one.fingerprint and not one.fingerprint.frees]
+            self._made, self._left = [one for one in terms if one.fingerprint and not one.fingerprint.frees], left
             return terms
         about = AboutFit.of(found, noise)
         own = evidence_of(noise, about.residual, about.unknowns)

@@ -52,7 +52,7 @@ _MOST_REFITTED = 8  # Terms of a round
 _SLIGHT = "beside what is left it tells too little"
 _IDLE = "the error does not fall with it"
 _TINY = 1e-9
-_WAYS = 2  # other ways that a search goes
+_FOLLOWED = 2  # alternatives
 NO_LIMIT = 100  # of effects
 
 
@@ -116,11 +116,11 @@ def search(
 
 
 @dataclass(frozen=True, eq=False)
-class Way:
-    """Another way on from a model: a Term that took about as much of its error as the one that was added."""
+class Alternative:
+    """A Term that took about as much of a model's error as the one that was added to it."""
 
-    before: Fit  # where it leaves
-    key: str  # of what was added there
+    before: Fit  # that model
+    key: str  # of what was added
     trial: Trial
 
 
@@ -167,7 +167,7 @@ class Search:
         self._objections: dict[Contender, str] = {}  # to contenders, by identity
         self._exchanges: set[tuple[str, str]] = set()  # that were tried
         self._barred: set[str] = set()  # effects that were added, and spoken against once all was there
-        self._ways: list[Way] = []  # not gone yet
+        self._alternatives: list[Alternative] = []  # not followed yet
         self._prior = -math.inf  # logarithm of the odds that one of the Terms is missing, as of the last round
 
     # --- whether a closed loop is worth a search ----------------------------------------------------------------------
@@ -197,7 +197,7 @@ class Search:
         """Goes on to the end, draws what is unknown, and settles."""
         story, tell = self.story, self._tell
         self._go_to_the_end()
-        self._go_other_ways()
+        self._follow_alternatives()
         self._curve_instead()
         if not story.current.calibration.is_final:
             story.finish(tell)
@@ -327,54 +327,58 @@ class Search:
         if not first.trial.faults:
             probable = seen.probabilities(contenders, ruled_out)
             story.set_probability(min(1.0, sum(probable[name] for name in as_probable)))
-            self._ways += [
-                Way(before, story.added[-1].key, one.trial)
+            self._alternatives += [
+                Alternative(before, story.added[-1].key, one.trial)
                 for one in named
                 if one.trial.candidate.name not in as_probable and self._takes_as_much(one.trial, first.trial)
             ]
         return True
 
-    # --- other ways ---------------------------------------------------------------------------------------------------
+    # --- alternatives -------------------------------------------------------------------------------------------------
 
     def _takes_as_much(self, other: Trial, best: Trial) -> bool:
         """Whether another trial leaves about as little, where both leave more than a model may."""
         return _shapes_between(self.story.data, self.story.held, other.fit, best.fit) < NAMED
 
-    def _go_other_ways(self) -> None:
-        """Goes on from what took about as much as something that was added: beside a large rest that says little.
+    def _follow_alternatives(self) -> None:
+        """Searches on from what took about as much of the error as something that was added.
 
-        Where the model still leaves more than it may, what took as much is as good a name, if it led to no better one.
+        Beside a large rest a difference says little.  Where the model leaves more than it may in the end, an
+        alternative is as good a name, unless it led to less.
         """
-        for way in sorted(self._ways, key=lambda one: one.trial.fit.chi2)[:_WAYS]:
-            gain = self._gone(way)
+        for other in sorted(self._alternatives, key=lambda one: one.trial.fit.chi2)[:_FOLLOWED]:
+            gain = self._follow(other)
             if gain is not None and abs(gain) <= NAMED:
-                self.story.tie(way.key, way.trial.candidate.name, True)
+                self.story.tie(other.key, other.trial.candidate.name, True)
             elif gain is not None and gain < 0.0:
-                self._ways = [one for one in self._ways if one is not way]
+                self._alternatives = [one for one in self._alternatives if one is not other]
         if within_band(self.story.data, self.story.current):
             return
         for one in self.story.added:
-            alike = {way.trial.candidate.name for way in self._ways if way.key == one.key} - {*self.story.named}
+            alike = {other.trial.candidate.name for other in self._alternatives if other.key == one.key} - {
+                *self.story.named
+            }
             if len(alike) >= LARGEST_GROUP:
                 self._take_back(one, f"{len(alike)} others tell as much")
                 return
             for name in alike:
                 self.story.tie(one.key, name, True)
 
-    def _gone(self, way: Way) -> float | None:
-        """How much more probable the model is that another way ends at, which then is the story's; None: it leads on.
+    def _follow(self, alternative: Alternative) -> float | None:
+        """How much more probable the model is that a search from an alternative ends at, as a logarithm.
 
-        At the floor by its evidence, elsewhere by what its rest says.
+        Far more probable, it is the story's.  At the floor by its evidence, elsewhere by what its rest says.  None
+        where the model holds it already, or what it was an alternative to no more.
         """
-        story, name = self.story, way.trial.candidate.name
-        place = next((i for i, step in enumerate(story.steps) if step.fit is way.before), None)
+        story, key, name = self.story, alternative.key, alternative.trial.candidate.name
+        place = next((i for i, step in enumerate(story.steps) if step.fit is alternative.before), None)
         added = {one.key: one for one in story.added}
         known = {*story.named, *causes(story.current.faults)}
-        if place is None or name in known or way.key not in added or name in added[way.key].same_as:
+        if place is None or name in known or key not in added or name in added[key].same_as:
             return None
-        self._tell(f"going on from {name} in place of {added[way.key].name}")
+        self._tell(f"going on from {name} in place of {added[key].name}")
         branch = replace(story, steps=story.steps[: place + 1], ties={}, refused={}, warnings=[])
-        branch.add(way.trial)
+        branch.add(alternative.trial)
         branch.finish(self._tell)
         most = min(self._most, 1 + len({one.name for one in story.added}))
         other = Search(branch, self._names, most, self._tell, self._rounds.elsewhere())
@@ -391,9 +395,9 @@ class Search:
             rest = _shapes_between(data, held, story.current, there)
             gain = math.copysign(min(abs(gain), abs(rest)), gain) if gain * rest > 0.0 else 0.0
         if gain > NAMED:
-            branch.set_probability(1.0 / (1.0 + math.exp(-gain)), way.trial.candidate.name)
+            branch.set_probability(1.0 / (1.0 + math.exp(-gain)), name)
             story.take_over(branch)
-            self._rivals, self._refitted, self._ways = [], None, []
+            self._rivals, self._refitted, self._alternatives = [], None, []
             self._barred = other._barred
         return gain
 

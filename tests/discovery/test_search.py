@@ -183,7 +183,7 @@ def test_an_effect_whose_error_does_not_fall_in_the_end_is_taken_back_and_not_tr
     assert bool(story.added) == kept
 
 
-# --- other ways: what took as much of the error, beside a large rest --------------------------------------------------
+# --- alternatives: what took as much of the error, beside a large rest ------------------------------------------------
 
 
 @pytest.mark.parametrize(
@@ -206,19 +206,19 @@ def test_an_effect_whose_error_does_not_fall_in_the_end_is_taken_back_and_not_tr
     ],
 )
 def test_what_leads_as_far_is_as_good_a_name(monkeypatch, gains, is_within, same_as):
-    """By the logarithm of how much more probable the model is that another way ends at; two are gone at most."""
+    """By the logarithm of how much more probable the model is that an alternative ends at; two are followed at most."""
     added = SimpleNamespace(key="a", name="a", same_as=[])
     story = SimpleNamespace(added=[added], named=["a"], data=None, held=None, current=None, refused={})
     story.tie = lambda key, name, equal: added.same_as.append(name)
     story.back_to_before = lambda key: story.added.clear()
     monkeypatch.setattr(search, "within_band", lambda data, found: is_within)
     of = search.Search(story)
-    of._ways = [
-        search.Way(None, "a", Trial(Candidate(name, 1.0, {}), {}, SimpleNamespace(chi2=place), 1.0))
+    of._alternatives = [
+        search.Alternative(None, "a", Trial(Candidate(name, 1.0, {}), {}, SimpleNamespace(chi2=place), 1.0))
         for place, name in enumerate(gains)
     ]
-    monkeypatch.setattr(of, "_gone", lambda way: gains[way.trial.candidate.name])
-    of._go_other_ways()
+    monkeypatch.setattr(of, "_follow", lambda one: gains[one.trial.candidate.name])
+    of._follow_alternatives()
     named = [one.name for one in story.added]
     assert sorted({*named, *added.same_as}) == same_as if named else same_as == []
     assert bool(named) or story.refused == {"a": "3 others tell as much"}

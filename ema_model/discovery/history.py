@@ -239,11 +239,10 @@ class Story:
         ]
         self.steps[-1] = replace(last, added=tuple(added))
 
-    def set_probability(self, probability: float, name: str = "") -> None:
-        """Says how probable it is that an effect, what was added last without its name, or what is alike is missing."""
+    def set_probability(self, key: str, probability: float) -> None:
+        """Says how probable it is that an effect of the last model, or what cannot be told from it, is missing."""
         last = self.steps[-1]
-        name = name or (last.added[-1].name if last.added else "")
-        added = (replace(one, probability=probability) if one.name == name else one for one in last.added)
+        added = (replace(one, probability=probability) if one.key == key else one for one in last.added)
         self.steps[-1] = replace(last, added=tuple(added))
 
     def without(self, key: str, tell: Progress = lambda text: None, found: Fit | None = None) -> Fit:

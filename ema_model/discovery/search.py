@@ -326,7 +326,7 @@ class Search:
             return True
         if not first.trial.faults:
             probable = seen.probabilities(contenders, ruled_out)
-            story.set_probability(min(1.0, sum(probable[name] for name in as_probable)))
+            story.set_probability(story.added[-1].key, min(1.0, sum(probable[name] for name in as_probable)))
             self._alternatives += [
                 Alternative(before, story.added[-1].key, one.trial)
                 for one in named
@@ -395,7 +395,8 @@ class Search:
             rest = _shapes_between(data, held, story.current, there)
             gain = math.copysign(min(abs(gain), abs(rest)), gain) if gain * rest > 0.0 else 0.0
         if gain > NAMED:
-            branch.set_probability(1.0 / (1.0 + math.exp(-gain)), name)
+            for new in alternative.trial.effects:
+                branch.set_probability(new, 1.0 / (1.0 + math.exp(-gain)))
             story.take_over(branch)
             self._rivals, self._refitted, self._alternatives = [], None, []
             self._barred = other._barred

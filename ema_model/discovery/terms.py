@@ -164,15 +164,18 @@ def strong_case(found: Fit, effect: Effect) -> float:
     The library's own machine has other currents, and other torques: a greater motor's teeth pull as much harder.  Of
     friction that the file has as well, as much again is no more than strong.
     """
+    return max(_of_machine(found, effect), _of_file(found, effect))
+
+
+def _of_file(found: Fit, effect: Effect) -> float:
+    """The file's own value of what an effect of the motor adds to, where that has its unit; else 0."""
     first = effect.parameters[0]
     unit = first.name.partition("_")[2]
-    if unit and first.side is MOTOR and effect.duplicates.endswith(unit):
-        own = abs(found.calibration.actuator.value(effect.duplicates))
-        return max(_strong_case(found, effect), own)
-    return _strong_case(found, effect)
+    is_more_of_it = unit and first.side is MOTOR and effect.duplicates.endswith(f"_{unit}")
+    return abs(found.calibration.actuator.value(effect.duplicates)) if is_more_of_it else 0.0
 
 
-def _strong_case(found: Fit, effect: Effect) -> float:
+def _of_machine(found: Fit, effect: Effect) -> float:
     first = effect.parameters[0]
     if first.side is MOTOR and first.unit in _TORQUES:
         usual = find(effect.name).severities[2]  # of the library's machine

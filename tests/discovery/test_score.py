@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from ema_model.actuator import load_actuator
-from ema_model.discovery import terms
+from ema_model.discovery import refit, terms
 from ema_model.discovery.fingerprints import Fingerprint
 from ema_model.effects import find
 
@@ -49,3 +49,30 @@ def test_a_strong_case_is_as_strong_as_the_machine(torque_Nm, times):
     found = SimpleNamespace(calibration=SimpleNamespace(signals=shown, actuator=load_actuator()))
     cogging = find("cogging_torque")
     assert terms.strong_case(found, cogging) == pytest.approx(times * cogging.severities[2])
+
+
+@pytest.mark.parametrize(
+    ("name", "path"),
+    [("dry_friction", "motor.dynamic_friction_Nm"), ("viscous_friction", "motor.viscous_friction_Nms_rad")],
+)
+def test_as_much_friction_again_as_the_file_has_is_no_more_than_strong(name, path):
+    """A joint has a hundred times the friction of the library's motor."""
+    actuator, effect = load_actuator(), find(name)
+    much = actuator.with_values({path: 50.0 * effect.severities[2]})
+    for one, times in ((actuator.with_values({path: 0.0}), 1.0), (much, 50.0)):
+        found = SimpleNamespace(calibration=SimpleNamespace(signals=[{"current_A": np.zeros(2)}], actuator=one))
+        assert terms.strong_case(found, effect) == pytest.approx(times * effect.severities[2])
+
+
+@pytest.mark.parametrize(
+    ("value", "z", "at_bound", "is_held"),
+    [(0.1, -0.5, False, False), (0.1, -2.5, False, True), (0.1, -1.9999999999, True, True), (0.0, -2.0, True, False)],
+    ids=["near its guess", "far from it", "at the end that the guess has", "at its own end"],
+)
+def test_a_guess_that_holds_a_parameter_back_is_seen_at_its_end_too(value, z, at_bound, is_held):
+    one = SimpleNamespace(value=value, z=z, at_bound=at_bound)
+    calibration = SimpleNamespace(parameters={"effects.load_dependent_friction.ratio": one})
+    found = SimpleNamespace(actuator=load_actuator(), calibration=calibration)
+    first = find("load_dependent_friction").parameters[0]
+    one.value = first.low if value == 0.0 else value
+    assert refit._is_held_back(found, ["load_dependent_friction"]) is is_held

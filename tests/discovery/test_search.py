@@ -8,8 +8,9 @@ from support.hidden_effects import ACTUATOR, SINE, recorded
 
 from ema_model.discovery import discover, rounds, search
 from ema_model.discovery.evidence import Unknowns, evidence_of, gains_of
+from ema_model.discovery.history import Step, Story
 from ema_model.discovery.refit import Trial
-from ema_model.discovery.result import Candidate
+from ema_model.discovery.result import Added, Candidate
 from ema_model.discovery.scoring import Evident
 from ema_model.estimation.noise import PIECE, NoiseModel
 
@@ -166,7 +167,7 @@ def test_an_effect_whose_error_does_not_fall_in_the_end_is_taken_back_and_not_tr
         story.added, story.ladder = (), story.ladder[:1]
 
     story.add, story.back_to_before = add, back_to_before
-    story.finish = story.set_probability = lambda tell: None
+    story.finish, story.set_probability = lambda tell: None, lambda key, probability: None
     of = search.Search(story)
     trial = Trial(Candidate("friction_zone", 1.0, {}), {"friction_zone": {}}, SimpleNamespace(), 1.0)
     monkeypatch.setattr(of, "_round", lambda: rounds.Round(None, None, Evident(0.0, 0.0, 0.0), (), []))
@@ -230,6 +231,18 @@ def test_what_is_left_beyond_the_floor_counts_as_a_few_values(monkeypatch, best,
     monkeypatch.setattr(search, "told_ratio", lambda data, found: found)
     data = SimpleNamespace(floor_spread=0.05, measurements=["one"])
     assert search._shapes_between(data, None, other, best) == pytest.approx(told, rel=0.05)
+
+
+def test_how_probable_one_order_is_says_nothing_of_another():
+    """Both have the effect's name; a fault has none among the effects."""
+    first, second = (
+        Added("cogging_torque", {}, 3.0, 2.0, None, None, (), key, probability=0.999)
+        for key in ("cogging_torque", "cogging_torque_2")
+    )
+    story = Story(None, None, [Step(None, None, (first, second))])
+    story.set_probability("cogging_torque_2", 0.5)
+    story.set_probability("k2", 0.1)
+    assert [one.probability for one in story.added] == [0.999, 0.5]
 
 
 # --- whether a closed loop is searched, and what stays of its rivals --------------------------------------------------

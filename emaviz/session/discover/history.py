@@ -219,7 +219,7 @@ class Telling:
         known = known_of(self.story.steps[-1], self.known)
         self.story.add(trial, ties=alike)
         if known is not None and trial.candidate.name in known.signatures and not trial.faults:
-            self.story.set_probability(known.probability(trial.candidate.name))
+            self.story.set_probability(self.story.added[-1].key, known.probability(trial.candidate.name))
         self.story.finish(tell)
         if self.first and trial.candidate.predicted_drop:
             self.first = with_drops(self.first, [trial])

@@ -109,9 +109,14 @@ def click(page, chart, share):
     page.mouse.click(left + share * width, top + 0.5 * height)
 
 
+def span(page, chart):
+    """Start and end of the time that a chart shows, s: (2,); nan while it is drawn anew."""
+    return np.array(page.evaluate(chart)[4:6], dtype=float)
+
+
 def drag(page, chart, start, end):
     """Zooms by the mouse; again where the chart was drawn anew under it, which ends a drag."""
-    before = page.evaluate(chart)[4:6]
+    before = span(page, chart)
     for _ in range(3):
         left, top, width, height, *_ = page.evaluate(chart)  # it may have moved, too
         page.mouse.move(left + start * width, top + 0.5 * height)
@@ -119,13 +124,13 @@ def drag(page, chart, start, end):
         page.mouse.move(left + end * width, top + 0.5 * height, steps=3)
         page.mouse.up()
         with contextlib.suppress(AssertionError):
-            return wait_until(lambda: not np.allclose(page.evaluate(chart)[4:6], before, atol=1e-6), 10.0)
+            return wait_until(lambda: np.any(np.abs(span(page, chart) - before) > 1e-6), 10.0)
     raise AssertionError("a drag does not zoom")
 
 
 def shows(page, chart, window, within):
     """Waits until the chart shows this part of time."""
-    wait_until(lambda: np.allclose(page.evaluate(chart)[4:6], window, atol=within), 20.0)
+    wait_until(lambda: np.allclose(span(page, chart), window, atol=within), 20.0)
 
 
 def table(page):
@@ -142,7 +147,7 @@ def test_a_run_is_measured_zoomed_and_looked_into(page, app, tmp_path):
     wait_until(lambda: app.session.simulation.command == "step" and page.evaluate(LIVE)[6] > 0.8 * lines.POINTS)
     run = app.session.simulation.reference
     shows(page, LIVE, (run.time_s[0], run.time_s[-1]), 0.02)  # and not the run before it
-    start, end = page.evaluate(LIVE)[4:6]
+    start, end = span(page, LIVE)
     click(page, LIVE, 0.2)
     page.get_by_text("Click once more for B").wait_for()
     page.wait_for_timeout(450)  # no double click
@@ -165,14 +170,14 @@ def test_a_run_is_measured_zoomed_and_looked_into(page, app, tmp_path):
     inside = np.count_nonzero((run.time_s >= quarter[0]) & (run.time_s <= quarter[1]))
     assert page.evaluate(LIVE)[6] == pytest.approx(min(inside, lines.POINTS), rel=0.1), "in full resolution"
     page.mouse.wheel(0, 120)
-    wait_until(lambda: np.diff(page.evaluate(LIVE)[4:6])[0] > 1.2 * (quarter[1] - quarter[0]), 20.0)
+    wait_until(lambda: np.diff(span(page, LIVE))[0] > 1.2 * (quarter[1] - quarter[0]), 20.0)
     left, top, width, height, *_ = page.evaluate(LIVE)
     page.mouse.dblclick(left + 0.4 * width, top + 0.5 * height)
     shows(page, LIVE, (start, end), 0.001)
     assert table(page) == found, "a double click moves no cursor"
 
     page.get_by_role("button", name="Event", exact=True).click()
-    wait_until(lambda: page.evaluate(LIVE)[5] < 0.9 * end, 20.0)
+    wait_until(lambda: span(page, LIVE)[1] < 0.9 * end, 20.0)
     assert page.evaluate(LIVE)[4] == pytest.approx(start, abs=0.01), "a step begins at once"
     page.get_by_role("button", name="Spectrum", exact=True).click()
     wait_until(lambda: "Spectrum: Equivalent current" in (page.evaluate(SHEET) or ""), 20.0)

@@ -21,7 +21,7 @@ from ema_model.effects import find
 from ema_model.errors import InputError, did_you_mean, quoted
 from ema_model.estimation import Calibration, Floor, after_fit, floor, of_unseen, taken_up
 from ema_model.estimation import calibrate as fit
-from ema_model.estimation.floor import band, least, spread, tells_nothing, twin_error
+from ema_model.estimation.floor import as_it_is, band, least, spread, tells_nothing, twin_error
 from ema_model.estimation.problem import SIGNALS
 from ema_model.faults import checked, named
 from ema_model.models import Model, Window, model_for
@@ -112,7 +112,7 @@ def _compare(
     else:
         floors = of_unseen(fitted, floors, *elsewhere, twins, wanted)
     plant, floors, before, after = _everywhere(recordings, fitted, floors, calibration, actuator)
-    own = twins if plant is fitted else [{} for _ in plant.windows]
+    own = [as_it_is(draws) for draws in twins] if plant is fitted else [{} for _ in plant.windows]
     residuals = residuals_of(plant, floors, after, own, calibration.actuator, calibration if plant is fitted else None)
     told = residuals, plant.windows, floors
     compared = [

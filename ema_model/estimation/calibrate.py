@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ema_model.actuator import Actuator
 from ema_model.actuator.parameters import on_axes
-from ema_model.estimation.floor import CORRELATED_S, Floor, local_rms
+from ema_model.estimation.floor import CORRELATED_S, DRAWS, Floor, local_rms
 from ema_model.estimation.information import Combination, by_pieces, covariance_of, known_together, measured, posterior
 from ema_model.estimation.least_squares import descended
 from ema_model.estimation.problem import (
@@ -106,7 +106,7 @@ def after_fit(
 
 
 def taken_up(floors: Sequence[Floor], calibration: Calibration, twins: Sequence[Signals]) -> Array:
-    """By how much a calibration's unknowns are off, as they take up what its twins differ by: (unknowns,), in σ."""
+    """By how far a calibration is off, as it takes up what its twins differ by: (unknowns, draws), in σ."""
     return _solved(_parts(floors, twins, calibration.weighted_sensitivities), calibration.x.size)
 
 
@@ -129,19 +129,20 @@ def of_unseen(
     _, jacobian = problem.jacobians(np.zeros((1, problem.count)), in_whole_blocks=True)
     slopes = by_window(problem, jacobian[0], weighted=True)
     shared = len(calibration.free)
-    moved = np.concatenate([taken[:shared], np.zeros(problem.count - shared)])
+    moved = np.concatenate([taken[:shared], np.zeros((problem.count - shared, taken.shape[1]))])
     rest = [(place, name, part, own - part @ moved) for place, name, part, own in _parts(floors, twins, slopes)]
     own_starts = [(place, name, part[:, shared:], own) for place, name, part, own in rest]
     moved[shared:] = _solved(own_starts, problem.count - shared)
     return _floors_left(floors, twins, slopes, moved)
 
 
-_Part = tuple[int, str, Array, Array]  # window, signal; weighted: sensitivities (blocks, unknowns), twin's difference
+# Window, signal; weighted: sensitivities (blocks, unknowns), and the twin's difference (blocks, draws).
+_Part = tuple[int, str, Array, Array]
 
 
 def _parts(floors: Sequence[Floor], twins: Sequence[Signals], slopes: Sequence[Mapping[str, Array]]) -> list[_Part]:
     return [
-        (place, name, part[name], twins[place][name] / floors[place].fit_sigma(name))
+        (place, name, part[name], (twins[place][name] / floors[place].fit_sigma(name)).T)
         for place, part in enumerate(slopes)
         for name in part
         if name in twins[place]
@@ -149,9 +150,9 @@ def _parts(floors: Sequence[Floor], twins: Sequence[Signals], slopes: Sequence[M
 
 
 def _solved(parts: Sequence[_Part], unknowns: int) -> Array:
-    """(JᵀJ + I)⁻¹Jᵀt"""
+    """(JᵀJ + I)⁻¹Jᵀt: (unknowns, draws)"""
     if not parts or not unknowns:
-        return np.zeros(unknowns)
+        return np.zeros((unknowns, DRAWS))
     jacobian, twin = (np.concatenate(one) for one in zip(*((j, t) for _, _, j, t in parts)))
     return np.asarray(np.linalg.solve(jacobian.T @ jacobian + np.eye(unknowns), jacobian.T @ twin), dtype=float)
 
@@ -165,7 +166,7 @@ def _floors_left(
     left: list[dict[str, Array]] = [{} for _ in floors]
     for place, name, part, own in _parts(floors, twins, slopes):
         one = floors[place]
-        before, after = (local_rms(t * one.fit_sigma(name), one.block_s) for t in (own, own - part @ taken))
+        before, after = (local_rms(t.T * one.fit_sigma(name), one.block_s) for t in (own, own - part @ taken))
         besides = _OF_TWINS * (np.maximum(one.model[name], before) ** 2 - before**2)
         left[place][name] = np.sqrt(besides + np.minimum(before, after) ** 2)
     return [replace(one, left=its) for one, its in zip(floors, left)]

@@ -116,6 +116,10 @@ def silent(windows: Sequence[Window], floors: Sequence[Floor]) -> tuple[str, str
 BAND_SIGMAS = 2.0  # σ on either side: 95 of 100 blocks of a perfect model lie within
 CORRELATED_S = 0.025  # how long the model's error, and a sensor's inaccuracy, stay alike
 _LEAST_OF_NOISE = 0.5  # that is always taken for the sensors'
+DRAWS = 16  # of the twin's difference, which relays and sticking make another one at the least change: as many as
+# the three-phase kernel runs at once, and so for the price of one
+_INERTIA = "motor.inertia_kgm2"
+_APART = 1e-4  # of the inertia, between draws: nobody knows it as well
 _STILL = 8.0  # of a position's noise, within which it stands
 POSITIONS = ("motor_position_rad", "user_position_rad")
 SPEED = "motor_speed_rad_s"  # which counts where no position is: it is mostly one's difference
@@ -205,13 +209,13 @@ def floor(
     """
     window, given = model.windows[place], stated or {}
     told = {name: one["noise"] for name, one in given.items() if "noise" in one}
-    twins, late = twin_error(model, place, None, k), model.a_sample_late(place, k)
+    draws, late = twin_error(model, place, None, k), model.a_sample_late(place, k)
     between = model.between_samples(place, k)
     noise = model.noise(place, told)
-    noise |= {name: _of_sensors(noise[name], twins[name]) for name in twins if name not in told}
+    noise |= {name: _of_sensors(noise[name], draws[name]) for name in draws if name not in told}
     slow = {}
     for name in noise:
-        lasting = local_rms(twins[name], window.block_s) if twins else np.zeros(window.blocks)
+        lasting = local_rms(draws[name], window.block_s) if draws else np.zeros(window.blocks)
         jump = late[name] / np.sqrt(12.0) if late else 0.0  # anywhere within the sample
         drawn = local_rms(between[name], window.block_s) if between else 0.0
         own = np.hypot(np.hypot(lasting, jump), np.hypot(drawn, window.lasting.get(name, 0.0)))
@@ -232,21 +236,33 @@ def floor(
 
 
 def local_rms(values: Array, block_s: float) -> Array:
-    """Over 12.5 ms on either side, (blocks,)."""
+    """Over 12.5 ms on either side, and over draws where there are some: (blocks,) or (draws, blocks) → (blocks,)."""
     width = max(3, round(CORRELATED_S / block_s) | 1)
-    return np.sqrt(np.maximum(uniform_filter1d(values**2, width, mode="nearest"), 0.0))
+    return np.sqrt(np.maximum(uniform_filter1d(np.mean(np.atleast_2d(values) ** 2, axis=0), width, mode="nearest"), 0.0))
 
 
-def _of_sensors(noise: float, twin: Array) -> float:
+def _of_sensors(noise: float, draws: Array) -> float:
     """What of a recording's noise is not the inverter's ripple, which the twin's difference has as well."""
-    return float(np.sqrt(max(noise**2 - white_noise(twin) ** 2, (_LEAST_OF_NOISE * noise) ** 2)))
+    ripple2 = np.mean([white_noise(one) ** 2 for one in draws])
+    return float(np.sqrt(max(noise**2 - ripple2, (_LEAST_OF_NOISE * noise) ** 2)))
 
 
 def twin_error(model: Model, place: int, actuator: Actuator | None = None, k: ArrayLike | None = None) -> Signals:
-    """What a model is known to be off by: its twin's measured signals less its own, (blocks,) each; empty without."""
-    twin = model.twin(place, actuator, k)
-    own = model.signals(place, actuator, k, even=True) if twin else {}
-    return {name: values - own[name][0] for name, values in twin.items()}
+    """What a model is known to be off by: its twin's measured signals less its own, (draws, blocks); empty without.
+
+    The first draw is of the actuator as it is; the others have a little more inertia each.
+    """
+    actuator = actuator or model.actuator
+    drawn = actuator.varied({_INERTIA: actuator.value(_INERTIA) * (1.0 + _APART * np.arange(DRAWS))})
+    faults = np.tile(actuator.k if k is None else np.asarray(k, dtype=float), (DRAWS, 1))
+    twins = model.twins(place, drawn, faults)
+    own = model.signals(place, drawn, faults, even=True) if twins else {}
+    return {name: values - own[name] for name, values in twins.items()}
+
+
+def as_it_is(draws: Signals) -> Signals:
+    """Of `twin_error`, the draw of the actuator as it is: (blocks,) each."""
+    return {name: values[0] for name, values in draws.items()}
 
 
 def repeats_of(window: Window, noise: Mapping[str, float]) -> Array:

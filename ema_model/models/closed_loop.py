@@ -28,7 +28,7 @@ from ema_model.recordings.noise import least_noise, sample_noise
 from ema_model.simulation.compiled import own_stack, stack_at_hand
 from ema_model.simulation.pack import initial_state, monitor_rows
 from ema_model.simulation.plant import simulate_references
-from ema_model.simulation.run import Run, reference_steps, simulate_reference, traced
+from ema_model.simulation.run import Run, reference_steps, traced
 
 Array = NDArray[np.float64]
 
@@ -102,52 +102,23 @@ class ClosedLoop:
             window = replace(window, load=mean, supply=np.ones_like(window.supply))
         return self._simulated(window, actuator, k, turned_rad, play_rad, faster_rad_s, pull_Nm, effects)
 
-    def twin(
-        self,
-        place: int,
-        actuator: Actuator | None = None,
-        k: ArrayLike | None = None,
-    ) -> Signals:
-        """The three-phase Reference Model's signals, of those that are measured, as in `Model`."""
-        window = self.windows[place]
-        actuator = (actuator or self.actuator).varied(window.values)
-        if not actuator.has_reference_model:
-            return {}
-        k = actuator.k if k is None else k
-        load, others = _load_and_others(window, self.effects)
-        run = _run(window, float(load))
-        shown = simulate_reference(
-            run,
-            actuator,
-            k,
-            others,
-            start_rad=window.user_rad,
-            start_speed_rad_s=window.speed_rad_s,
-            start_play_rad=window.play_rad,
-            start_integral_Nm=float(window.integral_Nm(actuator, k)),
-            start_time_s=window.begins_s,
-            before=_before(window, run),
-        )
-        measured = self._measured(window, actuator, {name: shown[name][None, 1:] for name in COMPARED})
-        return {name: values[0] for name, values in measured.items()}
-
     def twins(
         self,
         place: int,
         actuator: Actuator,
         k: Array,
-        turned_rad: ArrayLike,
-        play_rad: ArrayLike,
-        faster_rad_s: ArrayLike,
-        pull_Nm: ArrayLike,
-        effects: Effects,
+        turned_rad: ArrayLike = 0.0,
+        play_rad: ArrayLike = 0.0,
+        faster_rad_s: ArrayLike = 0.0,
+        pull_Nm: ArrayLike = 0.0,
+        effects: Effects | None = None,
     ) -> Signals:
         """As in `Model`."""
         window = self.windows[place]
         actuator = actuator.varied(window.values)
         if not actuator.has_reference_model:
             return {}
-        load, others = _load_and_others(window, effects)
+        load, others = _load_and_others(window, self.effects if effects is None else effects)
         run = _run(window)
         shown = simulate_references(
             run.command,
@@ -281,13 +252,12 @@ class ClosedLoop:
         return {name: later(values, late, block_s) for name, values in shown.items()}
 
 
-def _run(window: LoopWindow, load_Nm: float = 0.0) -> Run:
-    """A window as a run of the Reference Model, under a constant load."""
+def _run(window: LoopWindow) -> Run:
+    """A window as a run of the Reference Model."""
     return Run(
         Recorded(np.arange(len(window.command)) * window.step_s, window.command),
         duration_s=len(window.command) * window.step_s,
         sample_rate_Hz=1.0 / (window.steps_per_sample * window.step_s),
-        load_torque_Nm=load_Nm,
     )
 
 

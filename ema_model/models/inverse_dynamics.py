@@ -102,12 +102,8 @@ class InverseDynamics:
         """Itself, which has no steps."""
         return self
 
-    def twin(self, place: int, *args: object, **options: object) -> Signals:
-        """None: the Reference Model follows commands."""
-        return {}
-
     def twins(self, place: int, *args: object, **options: object) -> Signals:
-        """None."""
+        """None: the Reference Model follows commands."""
         return {}
 
     def noise(self, place: int, stated: Mapping[str, float]) -> dict[str, float]:

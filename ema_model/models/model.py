@@ -94,30 +94,21 @@ class Model(Protocol):
         """
         ...
 
-    def twin(
-        self,
-        place: int,
-        actuator: Actuator | None = None,
-        k: ArrayLike | None = None,
-    ) -> Signals:
-        """The same of the model of higher fidelity, where there is one, for one k (8,), `even`: (blocks,) each.
-
-        Empty where there is none.  Raises FloatingPointError if it diverges.
-        """
-        ...
-
     def twins(
         self,
         place: int,
         actuator: Actuator,
         k: Array,
-        turned_rad: ArrayLike,
-        play_rad: ArrayLike,
-        faster_rad_s: ArrayLike,
-        pull_Nm: ArrayLike,
-        effects: Effects,
+        turned_rad: ArrayLike = 0.0,
+        play_rad: ArrayLike = 0.0,
+        faster_rad_s: ArrayLike = 0.0,
+        pull_Nm: ArrayLike = 0.0,
+        effects: Effects | None = None,
     ) -> Signals:
-        """Those of a few at once, k (n, 8), all else as of `signals`: (n, blocks) each."""
+        """The measured ones of the model of higher fidelity, `even`, of a few at once: k (n, 8) → (n, blocks) each.
+
+        All else as of `signals`.  Empty where there is none.  Raises FloatingPointError if one diverges.
+        """
         ...
 
     def noise(self, place: int, stated: Mapping[str, float]) -> dict[str, float]:

@@ -75,7 +75,7 @@ def stack_at_hand(actuator: Actuator, effects: Iterable[str], circuit: str, kern
 def compile_library(actuator: Actuator) -> None:
     """Begins to compile the library's kernels for fits of an actuator and then for their twin, in another process."""
     library = library_stack(actuator)
-    twin = [(library, "run")] if actuator.has_reference_model else []
+    twin = [(library, "runs")] if actuator.has_reference_model else []
     compile_ahead([(library, _fitted_kernel(actuator)), *twin])
 
 

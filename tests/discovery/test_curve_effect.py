@@ -16,7 +16,7 @@ from ema_model.discovery.curve import curve_of, is_torque, with_curve
 from ema_model.effects import find
 from ema_model.effects.user import torque_curve, user_torque
 from ema_model.errors import InputError
-from ema_model.estimation.floor import twin_error
+from ema_model.estimation.floor import as_it_is, twin_error
 from ema_model.estimation.model_fit import Data, Fit, fit, gather, holdout_error
 from ema_model.recordings import prepared
 
@@ -37,7 +37,7 @@ def data_of(commands, effects, seed: int) -> Data:
 
 def explained(data: Data, found: Fit) -> Explanation:
     fitted, k = found.calibration.actuator, found.calibration.k
-    known = [twin_error(found.plant, place, fitted, k) for place in range(len(found.plant.windows))]
+    known = [as_it_is(twin_error(found.plant, place, fitted, k)) for place in range(len(found.plant.windows))]
     model = found.calibration.actuator
     residuals = residuals_of(found.plant, data.floors, found.calibration.signals, known, model, found.calibration)
     return explain(residuals, "current_A", ACTUATOR.axes)[0]

@@ -9,7 +9,7 @@ import pytest
 
 from ema_model.actuator import load_actuator
 from ema_model.commands import command
-from ema_model.estimation.floor import floor, twin_error
+from ema_model.estimation.floor import DRAWS, floor, twin_error
 from ema_model.faults import HEALTHY, vector
 from ema_model.models import Model, model_for
 from ema_model.recordings.measurement import Sensors
@@ -59,7 +59,9 @@ def test_a_floor_needs_nothing_else(model):
         for name, values in found.model.items():
             assert found.noise[name] > 0.0 and values.shape == (window.blocks,)
             np.testing.assert_allclose(more.model[name], np.hypot(values, 2.0))
-        assert (twin_error(model, place) != {}) == model.simulates_commands
+        draws = twin_error(model, place)
+        assert (draws != {}) == model.simulates_commands
+        assert all(values.shape == (DRAWS, window.blocks) for values in draws.values())
         assert (model.a_sample_late(place) != {}) == (model.simulates_commands and place == 1), "only a step jumps"
 
 

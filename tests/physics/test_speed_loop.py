@@ -13,6 +13,7 @@ from ema_model.actuator import Actuator, Tolerance, load_actuator
 from ema_model.actuator.parameters import Inverter
 from ema_model.commands import Recorded, command
 from ema_model.estimation import calibrate, floor
+from ema_model.estimation.floor import as_it_is
 from ema_model.faults import HEALTHY
 from ema_model.models import ClosedLoop
 from ema_model.recordings import Measurement
@@ -184,7 +185,7 @@ def test_a_drive_that_is_caught_in_mid_run_has_followed_its_command_before(effec
     [window] = plant.windows
 
     def apart():
-        shown = plant.twin(0) if three_phase else {name: one[0] for name, one in plant.signals(0).items()}
+        shown = as_it_is(plant.twins(0, actuator, np.atleast_2d(actuator.k)) if three_phase else plant.signals(0))
         return [np.sqrt(np.mean((shown[s] - window.measured[s]) ** 2)) for s in ("motor_position_rad", "current_A")]
 
     followed = np.array(apart())

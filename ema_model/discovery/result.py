@@ -70,7 +70,8 @@ class Candidate:
         str, Meta(description="why this model has no place for it; empty where it has one")
     ] = ""
     probability: Annotated[
-        float | None, Meta(description="that this, of all candidates or none, is missing; null: ruled out")
+        float | None,
+        Meta(description="that this, or an effect that has it among same_as, is missing; null: ruled out"),
     ] = None
 
     @property
@@ -466,10 +467,17 @@ class Discovery(Result):
 
     @property
     def ranked(self) -> list[Candidate]:
-        """Best first: by how probable they are, or what a refit gave, then by what was predicted; obstacles last."""
+        """Best first: by how probable they are, what is named before its rivals; then by their fall; obstacles last."""
+        named = {one.name for one in self.effects}
         return sorted(
             self.candidates,
-            key=lambda one: (bool(one.obstacle), -(one.probability or 0.0), one.refitted_drop is None, -one.drop),
+            key=lambda one: (
+                bool(one.obstacle),
+                -(one.probability or 0.0),
+                one.name not in named,
+                one.refitted_drop is None,
+                -one.drop,
+            ),
         )
 
     # --- as the JSON form has it --------------------------------------------------------------------------------------

@@ -355,7 +355,11 @@ def candidates(found: Discovery) -> Table | None:
         ]
         for one in found.ranked
     ]
-    remarks = [one.obstacle for one in found.ranked]
+    alike = {rival: one.name for one in found.effects for rival in one.same_as}
+    remarks = [
+        f"or {in_sentence(effect_title(alike[one.name]))}: not told apart" if one.name in alike else one.obstacle
+        for one in found.ranked
+    ]
     head = ("predicted", "refitted", *(("probable",) if is_probable else ()))
     return Table(head, rows, "candidates", remarks, "(fall of χ²)")
 

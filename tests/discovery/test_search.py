@@ -6,13 +6,14 @@ import numpy as np
 import pytest
 from support.hidden_effects import ACTUATOR, SINE, recorded
 
-from ema_model.discovery import discover, rounds, search
+from ema_model.discovery import discover, rounds, search, words
 from ema_model.discovery.evidence import Unknowns, evidence_of, gains_of
 from ema_model.discovery.history import Step, Story
 from ema_model.discovery.refit import Trial
-from ema_model.discovery.result import Added, Candidate
+from ema_model.discovery.result import Added, Candidate, effect_title
 from ema_model.discovery.scoring import Evident
 from ema_model.estimation.noise import PIECE, NoiseModel
+from ema_model.quantities.titles import in_sentence
 
 _COUNT = 6 * PIECE
 
@@ -310,6 +311,11 @@ def test_what_cannot_be_told_apart_is_one_group():
     found = _found({"constant_load": {"torque_Nm": 3.0}})
     assert {found.effects[0].name, *found.effects[0].same_as} == {"constant_load", "current_sensor_bias"}
     assert found.effects[0].probability > 0.99
+    shown = {one.name: one.probability for one in found.candidates}
+    assert shown["constant_load"] == shown["current_sensor_bias"] == found.effects[0].probability
+    table = words.candidates(found)
+    assert table.rows[0][0] != table.rows[1][0] and table.rows[0][-1] == table.rows[1][-1] == "> 99.9 %"
+    assert table.remarks[:2] == ["", f"or {in_sentence(effect_title(found.effects[0].name))}: not told apart"]
 
 
 @pytest.mark.long

@@ -238,7 +238,9 @@ def floor(
 def local_rms(values: Array, block_s: float) -> Array:
     """Over 12.5 ms on either side, and over draws where there are some: (blocks,) or (draws, blocks) → (blocks,)."""
     width = max(3, round(CORRELATED_S / block_s) | 1)
-    return np.sqrt(np.maximum(uniform_filter1d(np.mean(np.atleast_2d(values) ** 2, axis=0), width, mode="nearest"), 0.0))
+    return np.sqrt(
+        np.maximum(uniform_filter1d(np.mean(np.atleast_2d(values) ** 2, axis=0), width, mode="nearest"), 0.0)
+    )
 
 
 def _of_sensors(noise: float, draws: Array) -> float:

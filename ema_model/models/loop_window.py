@@ -27,6 +27,7 @@ _BESIDE = 20  # samples behind a time, that tell how a command goes there
 _FOLLOWED_S = 0.5  # before a start in mid-run: what a drive's goal still remembers
 COMPARED = ("current_A", "motor_speed_rad_s", "motor_position_rad", "user_position_rad")
 _SURELY = 4.0  # standard errors of a slope, from which on it moves
+_OF_A_LINE = 4  # samples, that tell a slope and its error
 _STEADY = 0.75  # of the speed in the second half of a time, that it is in the first: from rest it is a third
 _SLOPE_SAMPLES = 10  # on either side of a start in mid-run, over which the speed is found
 _COARSE_S = 0.01  # the same of the user's encoder, which is coarse beside a motor's
@@ -254,22 +255,30 @@ def _slope(measurement: Measurement, position: Array, at: int, least_s: float = 
     """The speed of a position about a sample; a rig's own is often the encoder's difference, far too coarse for one.
 
     least_s: on either side, over which it is found at least.  Where a recording begins, it is 0 unless it begins in
-    mid motion: from rest, the second half of a time is run through at three times the first one's speed.
+    mid motion: from rest, the second half of a time is run through at three times the first one's speed, if that time
+    is no longer than the start takes, and so it is halved as long as the speed is seen.
     """
     samples = max(_SLOPE_SAMPLES, round(least_s / measurement.sample_period_s))
     time = measurement.time_s
     if at > 0:
         near = _near(at, samples)
         return _line(time[near], position[near])[0]
-    halves = slice(samples), slice(samples, 2 * samples)
-    (early, error), (late, _) = (_line(time[half], position[half]) for half in halves)
-    is_moving = late != 0.0 and abs(early) > _SURELY * error and _STEADY < early / late < 1.0 / _STEADY
-    return 1.5 * early - 0.5 * late if is_moving else 0.0
+    moving = 0.0
+    while samples >= _OF_A_LINE:
+        halves = slice(samples), slice(samples, 2 * samples)
+        (early, error), (late, _) = (_line(time[half], position[half]) for half in halves)
+        if abs(early) <= _SURELY * error:
+            break
+        if late == 0.0 or not _STEADY < early / late < 1.0 / _STEADY:
+            return 0.0
+        moving = moving or 1.5 * early - 0.5 * late
+        samples //= 2
+    return moving
 
 
 def _line(time_s: Array, position: Array) -> tuple[float, float]:
     """The slope of a position, and its standard error; 0 of too few samples."""
-    if len(time_s) < 4:
+    if len(time_s) < _OF_A_LINE:
         return 0.0, math.inf
     (slope, _), covariance = np.polyfit(time_s, position, 1, cov=True)
     return float(slope), math.sqrt(covariance[0, 0])

@@ -258,3 +258,11 @@ def test_a_recording_may_begin_in_mid_motion(first):
     [window] = ClosedLoop([Measurement(seen)], DRIVE).windows
     assert window.speed_rad_s == pytest.approx(whole["motor_speed_rad_s"][first], rel=0.05, abs=1e-9)
     assert (first == 0) == (window.speed_rad_s == 0.0)
+
+
+@pytest.mark.parametrize("rate_Hz", [500.0, 1_000.0, 10_000.0])
+def test_a_slow_log_that_begins_at_rest_begins_at_rest(rate_Hz):
+    """A sine that a drive jumps after: at 500 Hz it is as fast as it will be within ten samples."""
+    moves = Run(command("sine", {"amplitude_rad": 0.03, "frequency_Hz": 3.0}), 0.3, sample_rate_Hz=rate_Hz)
+    [window] = ClosedLoop([simulate_reference(moves, THESIS)], THESIS).windows
+    assert window.speed_rad_s == 0.0

@@ -144,7 +144,7 @@ def result_of(
 
 
 def _as_named(candidates: Sequence[Candidate], named: Sequence[Added]) -> list[Candidate]:
-    """Candidates of the first round; those named since, and what is not told from them, as probable as is said there."""
+    """Candidates of the first round; those named since, and what is not told from them, as probable as said there."""
     since = {name: one.probability or 0.0 for one in named for name in (one.name, *one.same_as)}
     told = [
         replace(one, probability=max(one.probability or 0.0, since[one.name])) if one.name in since else one

@@ -26,6 +26,8 @@ from ema_model.faults import NAMES, cause_of
 
 Array = NDArray[np.float64]
 
+_FURTHER = 3  # steps of a fitted model by algebra, each from what the one before it gave
+_WORTH_A_RUN = 0.5  # of the logarithm of a probability, that a step promises
 _CLOSER = 12  # Terms that are looked at with the noise that each leaves
 
 
@@ -116,7 +118,10 @@ class Evident(NamedTuple):
 def evidence_of_fit(data: Data, held: Data | None, found: Fit, noise: NoiseModel) -> Evident:
     """The evidence of a refitted model.
 
-    It is taken where the fit ended, or where the algebra would go from there if that, simulated, is more probable.
+    It is taken where the fit ended, or where the algebra would go from there if that, simulated, is more probable; and
+    where it would go from what was simulated, as long as that promises more: two unknowns that count by their product,
+    as an inertia and its share, are far from straight.
+
     A further parameter of an effect, that does nothing by default, is as likely not there.
     """
     whole = AboutFit.of(found, noise)
@@ -124,14 +129,27 @@ def evidence_of_fit(data: Data, held: Data | None, found: Fit, noise: NoiseModel
 
     def about(left_out: Sequence[int]) -> tuple[float, float]:
         own = whole.without(left_out)
-        best = evidence_of(noise, own.residual, own.unknowns)
         moved = whole.to_mean(left_out)
-        there = moved.copy()
-        there[np.setdiff1d(np.arange(len(there)), left_out)] = best.amounts
-        points = problem.clip(found.calibration.x + np.array([moved, there]))
-        shown = problem.residuals(points)[:, : problem.values]
-        amounts = np.array([np.zeros(len(best.amounts)), best.amounts])
-        return max(evidence_at(noise, noise.coefficients(one), own.unknowns, a) for one, a in zip(shown, amounts))
+        free = np.setdiff1d(np.arange(len(moved)), left_out)
+
+        def simulated(amounts: Array) -> Array:
+            points = np.tile(found.calibration.x + moved, (len(amounts), 1))
+            points[:, free] += amounts
+            shown = problem.residuals(problem.clip(points))[:, : problem.values]
+            return np.array([noise.coefficients(one) for one in shown])
+
+        there = evidence_of(noise, own.residual, own.unknowns).amounts
+        first = np.array([np.zeros(len(there)), there])
+        residuals = simulated(first)
+        best = max(evidence_at(noise, one, own.unknowns, a) for one, a in zip(residuals, first))
+        for _ in range(_FURTHER):
+            promised = evidence_of(noise, residuals[-1] - own.unknowns.columns @ there, own.unknowns)
+            if promised.log < best[0] + _WORTH_A_RUN:
+                break
+            there = promised.amounts
+            residuals = simulated(there[None, :])
+            best = max(best, evidence_at(noise, residuals[-1], own.unknowns, there))
+        return best
 
     log, density = about([])
     beside = places_beside(found)

@@ -162,7 +162,7 @@ def strong_case(found: Fit, effect: Effect) -> float:
     """A strong case of an effect's first parameter; of one that counts by a signal's size, what this machine may have.
 
     The library's own machine has other currents, and other torques: a greater motor's teeth pull as much harder.  Of
-    friction that the file has as well, as much again is no more than strong.
+    friction or inertia that the file has as well, as much again is no more than strong.
     """
     return max(_of_machine(found, effect), _of_file(found, effect))
 
@@ -170,6 +170,8 @@ def strong_case(found: Fit, effect: Effect) -> float:
 def _of_file(found: Fit, effect: Effect) -> float:
     """The file's own value of what an effect of the motor adds to, where that has its unit; else 0."""
     first = effect.parameters[0]
+    if effect.duplicates == "motor.inertia_kgm2":
+        return 1.0  # its share
     unit = first.name.partition("_")[2]
     is_more_of_it = unit and first.side is MOTOR and effect.duplicates.endswith(f"_{unit}")
     return abs(found.calibration.actuator.value(effect.duplicates)) if is_more_of_it else 0.0

@@ -8,9 +8,11 @@ import numpy as np
 import pytest
 
 from ema_model.actuator import load_actuator
-from ema_model.discovery import refit, terms
+from ema_model.discovery import refit, scoring, terms
+from ema_model.discovery.evidence import Unknowns
 from ema_model.discovery.fingerprints import Fingerprint
 from ema_model.effects import find
+from ema_model.estimation.noise import PIECE, NoiseModel
 
 
 @pytest.mark.parametrize(
@@ -76,3 +78,28 @@ def test_a_guess_that_holds_a_parameter_back_is_seen_at_its_end_too(value, z, at
     first = find("load_dependent_friction").parameters[0]
     one.value = first.low if value == 0.0 else value
     assert refit._is_held_back(found, ["load_dependent_friction"]) is is_held
+
+
+def test_the_evidence_of_a_model_does_not_depend_on_where_its_fit_ended(monkeypatch):
+    """Two unknowns count by their product, as an inertia and its share: wherever a fit left them, it is one model."""
+    shape = np.random.default_rng(0).standard_normal(PIECE)
+    measured = 2.0 * shape + np.random.default_rng(1).standard_normal(PIECE)
+    noise = NoiseModel.of([("current_A", slice(0, PIECE))])
+    sigma = np.array([0.1, 1.0])  # of what they are known to be, both 1
+
+    def left(points):
+        return np.prod(np.atleast_2d(points), axis=1)[:, None] * 20.0 * shape - 20.0 * measured
+
+    def told(x):
+        columns = noise.coefficients(np.stack([x[1] * shape, x[0] * shape], axis=1) * 20.0)
+        unknowns = Unknowns(columns, 1.0 - x, sigma, np.full(2, -9.0), np.full(2, 9.0))
+        about = scoring.AboutFit(unknowns, noise.coefficients(left(x)[0]))
+        problem = SimpleNamespace(residuals=left, clip=lambda points: points, values=PIECE)
+        monkeypatch.setattr(scoring.AboutFit, "of", lambda found, noise: about)
+        monkeypatch.setattr(scoring, "problem_of", lambda *args, **options: problem)
+        monkeypatch.setattr(scoring, "places_beside", lambda found: [])
+        found = SimpleNamespace(plant=None, calibration=SimpleNamespace(free=(), x=x))
+        return scoring.evidence_of_fit(SimpleNamespace(floors=(), signals={}), None, found, noise).log
+
+    near, far = (told(np.array(x)) for x in ((1.01, 1.98), (1.8, 1.0)))
+    assert far == pytest.approx(near, abs=1.0)

@@ -61,6 +61,7 @@ def test_a_fault_is_a_card_that_is_added_taken_out_and_taken_back(faults):
 
     trial = story.trial(one)
     story.add(trial, assessment.alike.get(name, ()))
+    story.finish()
     assert set(story.current.faults) == set(faults) and not story.added
     assert story.ladder[-1].rmse < BAND and story.ladder[-1].holdout_rmse < BAND < story.ladder[0].rmse
     found = result_of(story)
@@ -72,7 +73,8 @@ def test_a_fault_is_a_card_that_is_added_taken_out_and_taken_back(faults):
     assert story.ladder[-1].change == Change("removed", tuple(faults)) and not story.current.faults
     assert story.ladder[-1].rmse == pytest.approx(story.ladder[0].rmse, rel=0.02)
     assert story.undo() and set(story.current.faults) == set(faults) and story.ladder[-1].rmse < BAND
-    assert story.undo() and not story.current.faults and story.ladder[-1].rmse == healthy
+    assert story.undo() and not story.current.faults
+    assert story.ladder[-1].rmse == pytest.approx(healthy, rel=0.05), "by a floor that was measured beside the fault"
 
 
 @pytest.mark.long

@@ -102,7 +102,7 @@ def result_of(
     outside = outside_tolerance(story.data, story.current)
     freed = [one for one in added if one.stands_for]
     lag = other_loop(story) if story.current.plant.simulates_commands else story.loop_lag
-    told = {*names, *(rival for one in named for rival in one.same_as)}  # refused at an earlier step, or not
+    told = {name for one in (*named, *freed) for name in (one.name, *one.same_as)}  # refused at an earlier step, or not
     return Discovery(
         verdict=verdict_of(story, named, unknown, interrupted),
         calibration=calibration,

@@ -82,8 +82,8 @@ def stood_in(before: Fit, after: Fit) -> tuple[StoodIn, ...]:
     """Parameters that came back toward the file's value."""
     moved = []
     for path, one in before.calibration.parameters.items():
-        now = after.calibration.parameters[path]
-        if not path.startswith("effects.") and abs(one.z) - abs(now.z) > _MOVED:
+        now = after.calibration.parameters.get(path)  # None of one that an effect multiplies
+        if now is not None and not path.startswith("effects.") and abs(one.z) - abs(now.z) > _MOVED:
             moved.append(StoodIn(path, one.z, now.z))
     return tuple(moved)
 

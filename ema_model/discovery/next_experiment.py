@@ -17,7 +17,6 @@ from ema_model.actuator import Actuator
 from ema_model.commands import command
 from ema_model.discovery.refit import Trial
 from ema_model.discovery.result import Experiment
-from ema_model.estimation import default_free
 from ema_model.estimation.calibrate import problem_of
 from ema_model.estimation.floor import Floor, floor
 from ema_model.estimation.model_fit import Data, Fit
@@ -123,7 +122,7 @@ def expected_chi2(
             problem_of(
                 plant,
                 floors,
-                free=(*default_free(rival.actuator), *_own_faults(rival, other)),
+                free=(*(path for path in rival.calibration.free if path not in NAMES), *_own_faults(rival, other)),
                 k=rival.calibration.k,
                 signals=signals,
             )

@@ -66,6 +66,7 @@ def together(
 ) -> Fit:
     """The model with effects, from settings by key, refitted; begun anew from where that first guess held it back."""
     best = None
+    effects, start = with_what_they_multiply(current, effects, start)
     for _ in range(_RECENTRED):
         actuator = current.actuator
         for key, settings in effects.items():
@@ -85,6 +86,22 @@ def together(
             break
     assert best is not None
     return best
+
+
+def with_what_they_multiply(
+    current: Fit, effects: Mapping[str, Mapping[str, float]], start: Mapping[str, float]
+) -> tuple[Mapping[str, Mapping[str, float]], Mapping[str, float]]:
+    """Effects and a start of which an effect that multiplies a base parameter takes on how far that is off."""
+    axes, actuator, given, left = current.actuator.axes, current.actuator, dict(effects), dict(start)
+    for key, settings in effects.items():
+        effect = find(key, axes)
+        first, path = effect.parameters[0], effect.duplicates
+        if not effect.scale or path not in actuator.tolerances:
+            continue
+        off = left.pop(path, 0.0) * actuator.tolerances[path].sigma / actuator.value(path)
+        whole = (1.0 + off) * (1.0 + effect.scale * settings[first.name])
+        given[key] = {**settings, first.name: first.nearest((whole - 1.0) / effect.scale)}
+    return given, left
 
 
 def fitted_to_the_end(data: Data, found: Fit, again: bool, tell: Progress = lambda text: None) -> Fit:

@@ -635,6 +635,11 @@ def sentences(found: Discovery) -> list[str]:
         shared = set(found.parameters_outside_tolerance) - by_themselves
         scale = f", counting what shares {whose} scale, as the torque constant" if shared else ""
         told.append(f"Outside {whose} tolerance{scale}: {outside}.")
+    for one in found.freed:
+        if one.same_as:
+            title = in_sentence(on_axes(one.stands_for, found.actuator.axes).title)
+            rivals = all_of([in_sentence(effect_title(name)) for name in one.same_as])
+            told.append(f"These recordings cannot tell another {title} from {rivals}.")
     told += moved(found)
     if found.unknown is not None:
         told.append(("Something else is left. " if found.effects else "") + found.unknown.sentence)

@@ -35,4 +35,5 @@ EFFECT = Effect(
     mistaken_for="current sensor gain, short circuit of all phases alike",
     family="electrics",
     duplicates="motor.torque_constant_Nm_A",
+    scale=-1.0,
 )

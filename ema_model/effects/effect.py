@@ -177,6 +177,7 @@ class Effect:
     states: tuple[str, ...] = ()  # of its own, 0 at the start; a stage of the drive, or `advance_states`, renews them
     advance_states: Callable[..., Any] | None = None  # (*ema_model.stacks.ADVANCE, parameters, states) → new states
     duplicates: str = ""  # path of the base parameter that does the same, e.g. "motor.inertia_kgm2"
+    scale: float = 0.0  # s of the factor 1 + s·p by which its first parameter p multiplies that; 0: it does not
     fault: str = ""  # the k that is the same of an actuator with a reference model, which has no such effect beside it
     is_load: bool = False  # pulls at the user from outside, so that its torque counts as the load
     at_speeds: tuple[float, ...] = ()  # of a first parameter that is a speed: shares of the top speed to look for it at

@@ -29,4 +29,5 @@ EFFECT = Effect(
     mistaken_for="position gain, torque constant, torsional compliance",
     family="mechanics",
     duplicates="motor.inertia_kgm2",
+    scale=1.0,
 )

@@ -30,4 +30,5 @@ EFFECT = Effect(
     mistaken_for="current sensor gain, torque constant, position gain, inertia error",
     family="drive",
     duplicates="controller.speed_gain_Nms_rad",
+    scale=1.0,
 )

@@ -29,4 +29,5 @@ EFFECT = Effect(
     mistaken_for="bus voltage sag, dead time",
     family="electrics",
     duplicates="motor.resistance_Ohm",
+    scale=1.0,
 )

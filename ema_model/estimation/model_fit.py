@@ -207,13 +207,15 @@ def fit(
 ) -> Fit:
     """Calibrates the base parameters but those held, those of the actuator's effects, and these faults together.
 
-    rough: as `calibrate` has it.
+    A base parameter that a free effect multiplies is held, too: how far it is off, that effect says, and only their
+    product is seen.  rough: as `calibrate` has it.
     """
     plant = data.plant(actuator)
+    fixed = {*held, *multiplied(actuator)}
     calibration = calibrate(
         plant,
         data.floors,
-        free=(*(path for path in default_free(actuator) if path not in held), *faults),
+        free=(*(path for path in default_free(actuator) if path not in fixed), *faults),
         signals=data.signals,
         start=start,
         on_progress=None if tell is None else lambda evaluations: tell(f"fitting (simulations: {evaluations})"),
@@ -222,6 +224,17 @@ def fit(
     names = [*calibration.parameters, *calibration.starts]
     starts = {name: float(x) for name, x in zip(names, calibration.x)}
     return Fit(actuator, plant, calibration, starts, faults, held)
+
+
+def multiplied(actuator: Actuator) -> dict[str, str]:
+    """Paths of base parameters that effects multiply whose first parameter is free, and those effects' keys."""
+    found: dict[str, str] = {}
+    for key in actuator.effects:
+        effect = find(key, actuator.axes)
+        own = actuator.tolerances.get(f"effects.{key}.{effect.parameters[0].name}")
+        if effect.scale and own is not None and own.free:
+            found[effect.duplicates] = key
+    return found
 
 
 def holdout_error(data: Data, found: Fit) -> float:

@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
-from ema_model.actuator import load_actuator
+from ema_model.actuator import Tolerance, load_actuator
 from ema_model.discovery import refit, scoring, terms
 from ema_model.discovery.evidence import Unknowns
 from ema_model.discovery.fingerprints import Fingerprint
 from ema_model.effects import find
+from ema_model.estimation.model_fit import multiplied, with_effect
 from ema_model.estimation.noise import PIECE, NoiseModel
 
 
@@ -103,3 +105,32 @@ def test_the_evidence_of_a_model_does_not_depend_on_where_its_fit_ended(monkeypa
 
     near, far = (told(np.array(x)) for x in ((1.01, 1.98), (1.8, 1.0)))
     assert far == pytest.approx(near, abs=1.0)
+
+
+@pytest.mark.parametrize(
+    ("name", "off", "settings", "whole"),
+    [
+        ("inertia_error", 2.0, {"ratio": 0.5}, 1.1 * 1.5 - 1.0),
+        ("demagnetisation", -3.0, {"ratio": 0.1}, 1.0 - 0.91 * 0.9),
+        ("demagnetisation", 3.0, {"ratio": 0.01}, 0.0),  # there is no more than none
+        ("dry_friction", 2.0, {"torque_Nm": 0.01}, 0.01),  # which adds, and leaves its parameter free
+    ],
+    ids=["more inertia", "weaker magnets", "at an end", "a sum"],
+)
+def test_an_effect_takes_on_how_far_what_it_multiplies_is_off(name, off, settings, whole):
+    """Of a product, only the whole is seen: a fit would have to find along a bent valley how to share it."""
+    actuator, effect = load_actuator(), find(name)
+    path, first = effect.duplicates, effect.parameters[0].name
+    sigma = {"motor.inertia_kgm2": 0.05, "motor.torque_constant_Nm_A": 0.03}.get(path, 0.1) * actuator.value(path)
+    free = {**actuator.tolerances, path: Tolerance(sigma, True)}
+    actuator = replace(actuator, tolerances=free)
+    found = SimpleNamespace(actuator=actuator)
+    given, left = refit.with_what_they_multiply(found, {name: settings}, {path: off, "pull 0": 1.0})
+    assert given[name][first] == pytest.approx(whole) and left["pull 0"] == 1.0
+    assert (path in left) == (not effect.scale)
+    assert (path in multiplied(with_effect(actuator, name, given[name]))) == bool(effect.scale)
+
+
+def test_what_a_file_says_of_an_effect_leaves_what_it_multiplies_free():
+    actuator = replace(load_actuator(), effects={"inertia_error": {"ratio": 0.5}})
+    assert not multiplied(actuator)

@@ -31,11 +31,34 @@ Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
+class LeftParts:
+    """What stands for `Left` where it is stored: with what was asked for."""
+
+    data: Data
+    found: Fit
+    explained: list[Explanation] | None
+    orders: list[float] | None
+    events: list[Event] | None
+
+    def made(self) -> Left:
+        """With what is known of it."""
+        made = Left(self.data, self.found)
+        known = {"explained": self.explained, "orders": self.orders, "events": self.events}
+        vars(made).update({name: one for name, one in known.items() if one is not None})  # as cached properties do
+        return made
+
+
+@dataclass(frozen=True, eq=False)
 class Left:
     """Of the residual that `comparison` would explain, the current's where it is measured: each part when asked for."""
 
     data: Data
     found: Fit
+
+    def made_of(self) -> LeftParts:
+        """As `ema_model.result` stores it."""
+        known = vars(self)
+        return LeftParts(self.data, self.found, known.get("explained"), known.get("orders"), known.get("events"))
 
     @cached_property
     def explained(self) -> list[Explanation]:

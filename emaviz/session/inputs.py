@@ -122,17 +122,19 @@ class Provenance:
         now: Callable[[], Inputs],
         job: Job | None = None,
         soon: Callable[[], object] = lambda: False,
+        reads: Callable[[], object] = lambda: False,
     ) -> None:
         """what: the result, as 'the comparison'; start: the button that computes it; now(): what that would take.
 
-        soon(): whether a run is about to begin by itself.
+        soon(): whether a run is about to begin by itself; reads(): whether what it would take is still being read.
         """
         self.what, self.start, self.now = what, start, now
         self.of: Inputs | None = None  # what is shown; None for nothing
         self.files: ResultFiles | None = None  # what can be written of it
         self.missing: SavedResult | None = None  # a session had it, and it is to be computed again
         self.whole: Whole | None = None  # where its tab does not save it among its own
-        self._job, self._soon = job, soon
+        self._job, self._soon, self._reads = job, soon, reads
+        self._why = ""  # what is missing could not be brought
         self._restored = False  # a session brought the result itself
         self._is_whole = False  # it is shown as a session brought it, while its files may still be read
         self._coming: Inputs | None = None  # of the run that goes on
@@ -156,12 +158,17 @@ class Provenance:
     def take(self, of: Inputs | None = None) -> None:
         """A result is there; of: its inputs, else those of the run that goes on."""
         self.of, self.missing, self._coming = of or self._coming or self.now(), None, None
-        self._is_whole = False
+        self._is_whole, self._why = False, ""
+
+    def lose(self, of: Inputs | None, why: str) -> None:
+        """A result that was there is not: it is to be computed again."""
+        self.clear()
+        self.missing, self._why = SavedResult(of), why
 
     def clear(self) -> None:
         """Nothing is shown any more."""
         self.of = self.missing = self._error = None
-        self._is_whole = False
+        self._is_whole, self._why = False, ""
 
     def _ended(self, job: Job) -> None:
         if job.error:
@@ -201,11 +208,12 @@ class Provenance:
                 return f"Being computed again: {had}."
             if not had:
                 return f"Not computed: {running}; {press}."
-            again = f"To be computed again: {had}, which this session was saved with; {press}."
+            why = f" ({self._why})" if self._why else ""
+            again = f"To be computed again: {had}, which this session was saved with{why}; {press}."
             return f"{again} {running}." if running else again
         if self.of is None:
             return ""
-        if self._is_whole and self.computing and self._coming is None:
+        if self._reads() or (self._is_whole and self.computing and self._coming is None):
             return ""  # its files are being read
         changed = self.of.changed(self.now())
         if self.computing:
@@ -238,9 +246,11 @@ class Provenance:
         whole: what `Whole.save` gave; where that cannot be shown, the result is to be computed again.
         """
         if whole is not None and self.whole is not None:
-            with suppress(InputError):
+            try:
                 self.whole.show(whole)
                 self.restored()
+            except InputError as error:
+                self._why = str(error)
         restored, self._restored = self._restored, False
         self.missing = self._error = None
         if saved is None:
@@ -276,13 +286,19 @@ def results_part(members: Callable[[], Mapping[str, Provenance]]) -> Part:
 _MOST_BYTES = 100_000_000  # of one result's arrays; a larger one is computed again
 
 
+def no_more_than_most(found: Any) -> Any:
+    """A stored result; InputError for one that is too large for a session's file."""
+    if _bytes(found) > _MOST_BYTES:
+        raise InputError("the result is too large to be stored")
+    return found
+
+
 def _whole(of: Provenance) -> Any:
     """A result as a session's file takes it; None without one, for one that is too large, or is not stored."""
     if of.whole is None or of.of is None:
         return None
     with suppress(InputError):
-        found = of.whole.save()
-        return found if _bytes(found) <= _MOST_BYTES else None
+        return no_more_than_most(of.whole.save())
     return None
 
 

@@ -148,12 +148,14 @@ def _shown(story: Story) -> ShownFit:
     found = story.current
     known = story.shown.get(found)
     if known is None or known.data is not story.data or known.held is not story.held:
+        data, held = story.data, story.held
+        simulation = known.simulation if known is not None and known.is_of(data, held) else None
         known = story.shown[found] = ShownFit(
-            story.data,
-            story.held,
-            with_intervals(story.data, found),
-            left_by(story.data, story.without_curve).events,
-            free_simulation(story.data, story.held, found),
+            data,
+            held,
+            with_intervals(data, found),
+            left_by(data, story.without_curve).events,
+            free_simulation(data, held, found) if simulation is None else simulation,
         )
     return known
 

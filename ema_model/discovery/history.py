@@ -109,6 +109,12 @@ class ShownFit:
     events: Sequence[Event]
     simulation: Mapping[str, Simulated]
 
+    def is_of(self, data: Data, held: Data | None) -> bool:
+        """Whether it is of these recordings, whatever the floors."""
+        return self.data.has_recordings_of(data) and (
+            held is self.held or (held is not None and held.has_recordings_of(self.held))
+        )
+
 
 @dataclass
 class Story:
@@ -328,6 +334,11 @@ class Story:
             calm={one: one for one in self.calm.values() if one in fits},
             shown={found: one for found, one in self.shown.items() if found in fits},
         )
+
+    @property
+    def undo_is_at_once(self) -> bool:
+        """Whether nothing is simulated by it: with other faults, errors are told in other floors."""
+        return len(self.steps) < 2 or self.steps[-2].fit.faults == self.current.faults
 
     def undo(self) -> bool:
         """Takes the last step back; False where there is none."""

@@ -25,7 +25,7 @@ from ema_model.comparison.regions import Event, events
 from ema_model.comparison.residuals import Residuals, residuals_of
 from ema_model.comparison.verdict import ORDER_OF_PRIMARY, lasting, most_of_floor
 from ema_model.estimation.floor import silent
-from ema_model.estimation.model_fit import Data, Fit, floor_ratio, twins_of
+from ema_model.estimation.model_fit import Data, Fit, floor_ratio
 
 Array = NDArray[np.float64]
 
@@ -131,7 +131,7 @@ def left_by(data: Data, found: Fit) -> Left:
 @lru_cache(maxsize=4)  # of a fit and of the one before it
 def residuals_left(data: Data, found: Fit) -> Residuals:
     """The residuals of a fit beside the variables that may explain them."""
-    return _residuals(data, found, twins_of(found))
+    return _residuals(data, found, found.twins)
 
 
 def _residuals(data: Data, found: Fit, known: Sequence[dict[str, Array]]) -> Residuals:

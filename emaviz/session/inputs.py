@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import hashlib
+import json
 import threading
 from collections.abc import Callable, Collection, Mapping
 from contextlib import suppress
 from dataclasses import dataclass
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -283,14 +285,23 @@ def results_part(members: Callable[[], Mapping[str, Provenance]]) -> Part:
     return Part(save, restore)
 
 
-_MOST_BYTES = 100_000_000  # of one result's arrays; a larger one is computed again
+_MOST_BYTES = 100_000_000  # of one tab's arrays
+_MOST_TEXT = 2_000_000  # of all else in it, as a file has it
 
 
-def no_more_than_most(found: Any) -> Any:
-    """A stored result; InputError for one that is too large for a session's file."""
-    if _bytes(found) > _MOST_BYTES:
-        raise InputError("the result is too large to be stored")
-    return found
+class Room:
+    """What the results of one tab may take of a session's file; one that finds no room is computed again."""
+
+    def __init__(self) -> None:
+        self._arrays, self._text = _MOST_BYTES, _MOST_TEXT
+
+    def take(self, found: Any) -> Any:
+        """A stored result; InputError for one that is too large."""
+        arrays, text = _bytes(found), len(json.dumps(found, default=lambda array: None))
+        if arrays > self._arrays or text > self._text:
+            raise InputError("the result is too large to be stored")
+        self._arrays, self._text = self._arrays - arrays, self._text - text
+        return found
 
 
 def _whole(of: Provenance) -> Any:
@@ -298,7 +309,7 @@ def _whole(of: Provenance) -> Any:
     if of.whole is None or of.of is None:
         return None
     with suppress(InputError):
-        return no_more_than_most(of.whole.save())
+        return Room().take(of.whole.save())
     return None
 
 
@@ -310,13 +321,24 @@ def _bytes(value: Any) -> int:
     return getattr(value, "nbytes", 0)
 
 
+_MOST_READ = 100_000_000  # bytes, of a file that is known again by what is in it; a larger one by when it was written
+
+
 def version_of(path: Path, *said: object) -> str:
-    """By which a file is known again, with what was said of how to read it; '' where it is not there."""
+    """By which a file is known again, elsewhere too, with what was said of how to read it; '' where it is not there."""
     try:
         at = path.stat()
+        own = str(at.st_mtime_ns) if at.st_size > _MOST_READ else _digest_of(path, at.st_size, at.st_mtime_ns)
     except OSError:
         return ""
-    return " ".join((str(at.st_size), str(at.st_mtime_ns), *(digest(one) for one in said)))
+    return " ".join((str(at.st_size), own, *(digest(one) for one in said)))
+
+
+@lru_cache(maxsize=20_000)
+def _digest_of(path: Path, size: int, changed_ns: int) -> str:
+    """Of what is in a file; it is read again once it has another size, or was written since."""
+    with path.open("rb") as file:
+        return hashlib.file_digest(file, lambda: hashlib.blake2b(digest_size=16)).hexdigest()
 
 
 def version_with_side(path: Path) -> str:

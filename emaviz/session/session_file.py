@@ -70,9 +70,11 @@ def write_session(path: Path, parts: Mapping[str, Part], folder: DataFolder, nam
                 if side != file and side.is_file() and folder.holds(side):
                     archive.write(side, _FILES + folder.name_of(side))
             arrays = _Arrays()
-            archive.writestr(_DOCUMENT, json.dumps(arrays.taken_from(document), indent=1))
+            archive.writestr(_DOCUMENT, json.dumps(arrays.taken_from(document), separators=(",", ":")))
             if arrays.every:
                 archive.writestr(_ARRAYS, bytes(arrays.every))
+            if archive.getinfo(_DOCUMENT).file_size > SETTINGS_BYTES or _unpacks_to(archive) > SESSION_BYTES:
+                raise InputError(f"{quoted(path.name)}: the session is too large to be opened again; open fewer files")
     except OSError as error:
         raise InputError(f"{quoted(path.name)}: cannot be written ({error.strerror}); check the disk") from None
 
@@ -112,7 +114,7 @@ def _document(archive: SafeZip, path: Path) -> dict[str, Any]:
     if _ARRAYS in archive.names:
         arrays = archive.read(_ARRAYS)
         try:
-            document = _with_arrays(document, arrays, {})
+            document = _Placed(arrays).put_into(document)
         except (LookupError, OverflowError, RecursionError, TypeError, ValueError):
             raise Damaged("its arrays do not fit") from None
     if not isinstance(document, dict) or not isinstance(document.get("files", []), list):
@@ -122,6 +124,11 @@ def _document(archive: SafeZip, path: Path) -> dict[str, Any]:
         told = schema if isinstance(schema, int | str) else "unknown"
         raise InputError(f"{shown(path.name)}: was saved by another version (schema {shown(told)})")
     return document
+
+
+def _unpacks_to(archive: zipfile.ZipFile) -> int:
+    """Bytes."""
+    return sum(one.file_size for one in archive.infolist())
 
 
 _PLAIN = "biufU"  # kinds of arrays that are numbers, truths or text
@@ -150,19 +157,32 @@ class _Arrays:
         return [self.taken_from(one) for one in value] if isinstance(value, list | tuple) else value
 
 
-def _with_arrays(value: Any, arrays: bytes, known: dict[tuple[Any, ...], np.ndarray]) -> Any:
-    """The same with each array in its place; known: those that were made, by their notes."""
-    if isinstance(value, dict):
-        if value.keys() != {_ARRAY}:
-            return {name: _with_arrays(one, arrays, known) for name, one in value.items()}
-        spelled, shape, first = value[_ARRAY]
-        kind, note = np.dtype(spelled), (spelled, *shape, first)
+class _Placed:
+    """Arrays back in the places of their notes, each made once."""
+
+    def __init__(self, every: bytes) -> None:
+        self._every, self._room = every, SESSION_BYTES
+        self._known: dict[tuple[Any, ...], np.ndarray] = {}  # by their notes
+
+    def put_into(self, value: Any) -> Any:
+        """A part of the document with its arrays; ValueError, and others, for notes that make no sense."""
+        if isinstance(value, dict):
+            if value.keys() != {_ARRAY}:
+                return {name: self.put_into(one) for name, one in value.items()}
+            spelled, shape, first = value[_ARRAY]
+            if (note := (spelled, *shape, first)) not in self._known:
+                self._known[note] = self._made(np.dtype(spelled), shape, first)
+            return self._known[note]
+        return [self.put_into(one) for one in value] if isinstance(value, list) else value
+
+    def _made(self, kind: np.dtype, shape: list[int], first: int) -> np.ndarray:
         if kind.kind not in _PLAIN or kind.itemsize == 0 or min([first, *shape]) < 0:
             raise ValueError("no array of numbers or text")
-        if note not in known:
-            known[note] = np.frombuffer(arrays, kind, math.prod(shape), first).reshape(shape).copy()
-        return known[note]
-    return [_with_arrays(one, arrays, known) for one in value] if isinstance(value, list) else value
+        made = np.frombuffer(self._every, kind, math.prod(shape), first).reshape(shape).copy()
+        self._room -= made.nbytes
+        if self._room < 0:
+            raise ValueError("more arrays than a session's file holds")
+        return made
 
 
 def _take_files(archive: SafeZip, document: Mapping[str, Any], folder: DataFolder) -> dict[str, str]:

@@ -384,19 +384,30 @@ class Discovering:
                 if self._shown.is_behind:
                     self._shown.show(told)  # a step further: the ladder grows
 
+            told.rounds.begin(told.story)
             search(told.story, say, rounds=told.rounds, refits=told.refits)
             self._shown.assess(told, tell)
 
         return self.job.begin("Finding all that is missing", job)
 
     def undo(self) -> None:
-        """The last step back, at once."""
+        """The last step back: at once, but for what has to be looked at again."""
         told, _ = self._seen()
-        if not told.story.undo():
+        if len(told.story.steps) < 2:
             raise InputError("there is no step to take back")
-        self._shown.show(told)
-        if not told.is_assessed:  # of a walk that went on at once
-            self.job.begin("Looking again", lambda tell: self._shown.assess(told, tell))
+        if told.story.undo_is_at_once:
+            told.story.undo()
+            self._shown.show(told)
+            if not told.is_assessed:  # of a walk that went on at once
+                self.job.begin("Looking again", lambda tell: self._shown.assess(told, tell))
+            return
+
+        def job(tell: Tell) -> None:
+            tell("measuring the error without the fault")
+            told.story.undo()
+            self._shown.assess(told, tell)
+
+        self.job.begin("Taking the step back", job)
 
     @property
     def experiment(self) -> Experiment | None:

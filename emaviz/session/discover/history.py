@@ -27,7 +27,7 @@ from ema_model.quantities.numbers import number
 from ema_model.quantities.titles import in_sentence
 from ema_model.result import restored, stored
 from emaviz.session.discover.source import DiscoverySource, Recipe, SavedStory, story_of
-from emaviz.session.inputs import Inputs, no_more_than_most
+from emaviz.session.inputs import Inputs, Room
 from emaviz.session.jobs import Signal, Tell, aside
 
 # --- candidates refitted in the model of a story, each once -----------------------------------------------------------
@@ -114,6 +114,7 @@ class Telling:
 
     def assess(self) -> None:
         """Looks at what the last model leaves; takes a second, and the first time a compilation."""
+        self.rounds.begin(self.story)
         found = self.known[self.story.steps[-1]] = assessed(self.story, self.rounds)
         self.first = self.first or found.candidates
 
@@ -303,15 +304,16 @@ class Entries:
             return None
         if current is self.current:
             current.revealed = self._source.revealed
-        first, *others = (self._saved(one) for one in (current, *(one for one in self.all if one is not current)))
+        room, rest = Room(), [one for one in reversed(self.all) if one is not current]
+        first, *others = (self._saved(one, room) for one in (current, *rest))
         return {**first, "others": others}
 
-    def _saved(self, entry: Entry) -> dict[str, Any]:
+    def _saved(self, entry: Entry, room: Room) -> dict[str, Any]:
         told, look = entry.told, entry.look
         found = None
         if told is not None and look is not None:
-            with suppress(InputError):  # a step is running, or a step has what is not stored
-                found = no_more_than_most(told.stored(look))
+            with suppress(InputError):  # there is no room for it, or a step changes it
+                found = room.take(told.stored(look))
         return {**msgspec.to_builtins(entry.saved()), "story": found}
 
     def bring(self, saved: Any, names: Mapping[str, str]) -> Entry:

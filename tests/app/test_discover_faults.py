@@ -124,7 +124,7 @@ def test_reveal_holds_the_faults_against_the_truth(worn):
 
 @pytest.mark.long
 def test_a_session_keeps_the_fault_and_undo_takes_it_back(rig, worn):
-    path, before = rig.save(), worn.look
+    path, before, entry = rig.save(), worn.look, worn.entries.current
     for entry in worn.entries.all:
         entry.number += 100  # so that none of them is taken for one of the file's
     rig.load(path)
@@ -132,7 +132,11 @@ def test_a_session_keeps_the_fault_and_undo_takes_it_back(rig, worn):
     assert "k2" in worn.look.found.faults and worn.look.removable == before.removable
     worn.undo()
     rig.done()
-    assert not worn.look.found.faults and worn.look.rmse == pytest.approx(rig.offered.rmse)
+    again = worn.look
+    worn.show(entry)
+    worn.undo()
+    rig.done()
+    assert worn.look is not again and not worn.look.found.faults and worn.look.rmse == pytest.approx(again.rmse)
 
 
 @pytest.mark.long

@@ -22,7 +22,6 @@ from emaviz.session.campaigns import Campaigns
 from emaviz.session.compare import Comparing
 from emaviz.session.data_folder import DataFolder
 from emaviz.session.discover.discovering import Discovering
-from emaviz.session.discover.history import Entry
 from emaviz.session.explore import Session
 from emaviz.session.fleet import ComparingUnits
 from emaviz.session.inputs import Inputs, Provenance, results_part
@@ -299,14 +298,12 @@ def test_flights_that_were_identified_so_far_are_saved(app):
     assert [one["name"] for one in app.track.saved()["flights"]] == ["chirp"]
 
 
-def test_steps_that_a_session_brought_are_not_lost_when_they_are_stopped(app, monkeypatch):
+def test_a_discovery_whose_story_is_not_there_is_not_lost_when_it_is_saved_again(app):
     discover = app.discover
-    saved = {"recipe": {"challenge": "first_bench_run"}, "steps": [{"model": "x", "starts": {}}]}
-    monkeypatch.setattr(app.session.worker, "start", lambda *_: False)  # it has to wait
+    saved = {"recipe": {"challenge": "first_bench_run"}, "says": "1 added, 1.1 × floor"}
     discover.restore(saved, {})
-    entry = discover.entries.current
-    assert isinstance(entry, Entry) and discover.job.waiting
-    discover.job.stop()
-    assert len(discover.saved()["steps"]) == 1
-    assert discover.start() and discover.job.waiting and discover.entries.current is entry
-    assert len(discover.entries.all) == 1 and len(discover.saved()["steps"]) == 1
+    assert not discover.running and not discover.job.waiting and len(discover.entries.all) == 1
+    again = discover.saved()
+    assert again["recipe"]["challenge"] == "first_bench_run" and again["says"] == saved["says"]
+    discover.restore(again, {})
+    assert len(discover.entries.all) == 1

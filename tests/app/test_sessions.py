@@ -123,10 +123,10 @@ def test_damaged_settings_are_refused_and_change_nothing(damage):
         ),
         (
             SavedStory,
-            {"recipe": {"window_s": [0.0, math.inf]}, "steps": []},
+            {"recipe": {"window_s": [0.0, math.inf]}},
             "a window has",
         ),
-        (SavedStory, {"recipe": {}, "steps": [{"model": "", "starts": {"x": 1e9}}]}, ""),
+        (SavedStory, {"recipe": {}, "number": -1}, "Expected `int` >= 0"),
     ],
 )
 def test_what_a_part_of_a_session_lacks_is_said_in_one_line_with_its_place(kind, saved, line):

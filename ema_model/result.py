@@ -395,7 +395,7 @@ _MANY: dict[Any, Callable[[Any], Any]] = {
 
 def _restored_object(given: dict[str, Any], kind: type, known: list[tuple[type, Any]]) -> Any:
     made = _is_made_of(kind)
-    parts = get_type_hints(vars(kind)["made_of"])["return"] if made else kind
+    parts = get_type_hints(kind.made_of)["return"] if made else kind
     if "same" in given:
         was, found = known[_as_said(given["same"], int)]
         if not issubclass(was, parts):

@@ -74,7 +74,15 @@ class ClosedLoop:
 
     def made_of(self) -> ModelParts:
         """As in `Model`."""
-        return ModelParts(self.recorded, self.actuator, self.effects, self._stretches, self._circuit, self._block_s)
+        return ModelParts(
+            self.recorded,
+            self.actuator,
+            self.effects,
+            self._stretches,
+            self._circuit,
+            self._block_s,
+            self._own_kernels,
+        )
 
     @cached_property
     def stack(self) -> Stack:

@@ -60,6 +60,7 @@ class ModelParts:
     stretches: Sequence[list[slice] | None] | None
     circuit: str
     block_s: float
+    own_kernels: bool = False
 
     def made(self) -> Model:
         """The model; its windows are cut, and its kernels found, once they are asked for."""
@@ -68,7 +69,8 @@ class ModelParts:
         given: dict[str, Any] = {"effects": self.effects, "stretches": self.stretches, "at_once": False}
         if is_inverse(self.measurements, self.actuator):
             return InverseDynamics(self.measurements, self.actuator, **given)
-        return ClosedLoop(self.measurements, self.actuator, circuit=self.circuit, block_s=self.block_s, **given)
+        given |= {"circuit": self.circuit, "block_s": self.block_s, "own_kernels": self.own_kernels}
+        return ClosedLoop(self.measurements, self.actuator, **given)
 
 
 class Model(Protocol):

@@ -17,6 +17,7 @@ from ema_model.commands import command
 from ema_model.faults import HEALTHY
 from ema_model.recordings import write_measurement
 from ema_model.simulation.run import Run, simulate_reference
+from ema_model.tracking.flights import Flight
 from emaviz.session import session_file
 from emaviz.session.campaigns import Campaigns
 from emaviz.session.compare import Comparing
@@ -293,9 +294,11 @@ def test_a_session_of_today_and_one_without_results_are_both_read(app, tmp_path)
 
 def test_flights_that_were_identified_so_far_are_saved(app):
     """Also before there are enough of them to be followed, as while they are being identified."""
-    flight = SimpleNamespace(name="chirp", k=np.zeros(8), own=np.eye(8), common=np.zeros((8, 3)), excluded="")
+    flight = Flight("chirp", np.zeros(8), np.eye(8), np.zeros((8, 3)))
     app.track._flights = {app.data.folder / "bench" / "flight_1.csv": flight}
-    assert [one["name"] for one in app.track.saved()["flights"]] == ["chirp"]
+    saved = app.track.saved()
+    assert [one["file"] for one in saved["flights"]] == ["flight_1.csv"]
+    assert [one["fields"]["name"] for one in saved["whole"]["fields"]["flights"]] == ["chirp"]
 
 
 def test_a_discovery_whose_story_is_not_there_is_not_lost_when_it_is_saved_again(app):

@@ -104,6 +104,18 @@ class CampaignControls:
         self._page.workspaces.bring_forward(self._at.name, "", _TAB)
         self._post(self._show)
 
+    def saved(self) -> dict[str, Any] | None:
+        """The campaign that is shown, for a session's file."""
+        return self._campaigns.saved(str(self._choice.value))
+
+    def restore(self, saved: Any) -> None:
+        """Takes a session's, and shows it; what is wrong with it stands below the list."""
+        if saved is not None:
+            try:
+                self.choose(self._campaigns.restore(saved))
+            except InputError as error:
+                self._say(str(error))
+
     # --- on the files' thread ---------------------------------------------------------------------------------------
 
     def refresh(self) -> None:

@@ -20,7 +20,7 @@ from ema_model.campaign.plan_axes import TaskInputs, inputs_of
 from ema_model.campaign.result import Campaign
 from ema_model.campaign.run import Status, duration, estimate_s, run_plan
 from ema_model.campaign.schedulers import scheduler
-from ema_model.campaign.store import Store
+from ema_model.campaign.store import Packed, Store
 from ema_model.campaign.task import Task
 from ema_model.comparison import compare
 from ema_model.discovery import discover
@@ -29,16 +29,19 @@ from ema_model.files.opened import shown
 from ema_model.identification.run import Progress, identify
 from ema_model.identification.search import Objective
 from ema_model.recordings import Measurement
+from ema_model.result import restored, stored
 from emaviz.session.data_folder import DataFolder
 from emaviz.session.explore import Session
-from emaviz.session.inputs import Inputs, digest
+from emaviz.session.inputs import Inputs, Room, digest
 from emaviz.session.jobs import Job, Run, Signal, Steps, Stopped, Tell, elsewhere
+from emaviz.session.settings import taken
 
 _HEADER = "campaign.json"
 _DEPTHS = ("*", "*/*")  # below the data folder
 _OWN, _PLANS = "campaigns", "plans"  # folders of the data folder: of campaigns that begin here, of plans of one's own
 REPORT = "report.html"
 _THESIS = ("thesis_quick", "thesis")  # the plans of which a report and a recording are set beside the thesis
+_MOST_ALIKE = 100  # campaigns of one name
 _NAME = re.compile(r"\w[\w.() +-]{0,60}")
 _LOOK_S = 0.1
 
@@ -55,6 +58,12 @@ class Computing:
     def reproduces(self) -> bool:
         """Whether it is the thesis's evaluation."""
         return self.plan in _THESIS
+
+
+class SavedCampaign(msgspec.Struct, frozen=True):
+    """What a session's file says of the campaign that is shown; its folder stands beside."""
+
+    name: str
 
 
 class Campaigns:
@@ -92,6 +101,40 @@ class Campaigns:
         folder = self._folders().get(name)
         rows = [] if folder is None else sorted((str(one), _as_it_is(one)) for one in folder.rglob("*.parquet"))
         return Inputs(name, name, options={"the set of its rows": digest(rows)})
+
+    # --- a session --------------------------------------------------------------------------------------------------
+
+    def saved(self, name: str) -> dict[str, Any] | None:
+        """The campaign of that name with its rows, for a session's file; its name alone where there is no room."""
+        if name not in self._folders():
+            return None
+        with suppress(InputError):
+            return {"name": name, "campaign": Room().take(stored(self.store(name).packed()))}
+        return {"name": name, "campaign": None}
+
+    def restore(self, saved: Any) -> str:
+        """Takes a session's into the data folder, unless it is there; its name.  InputError for what makes no sense."""
+        told: SavedCampaign = taken(SavedCampaign, saved, "campaign")
+        given = saved.get("campaign")
+        if given is None:
+            self.store(told.name)  # which says that it is not here
+            return told.name
+        packed, folders = restored(given, Packed), self._folders()
+        if (known := folders.get(told.name)) is not None and _is_same(Store(known), packed):
+            return told.name
+        stem = Path(told.name).name
+        stem = stem if _NAME.fullmatch(stem) else "campaign"
+        for number in range(1, _MOST_ALIKE):
+            name = f"{_OWN}/{stem}" + (f" ({number})" if number > 1 else "")
+            if (folder := self._data.folder / name).exists():
+                if name in folders and _is_same(Store(folders[name]), packed):
+                    return name
+                continue
+            if not self._data.holds(folder):
+                break
+            Store.unpacked(folder, packed)
+            return name
+        raise InputError(f"{shown(stem, 60)}: too many campaigns have this name; remove some")
 
     # --- one that begins --------------------------------------------------------------------------------------------
 
@@ -212,6 +255,12 @@ class Campaigns:
         path, run, said = self._recorded
         self.opened(path, run)
         return said
+
+
+def _is_same(one: Store, other: Packed) -> bool:
+    """Whether a folder's campaign is the one of a session, which may have fewer rows."""
+    own = one.packed()
+    return own.header == other.header and own.plan == other.plan and own.rows.keys() >= other.rows.keys()
 
 
 def _as_it_is(path: Path) -> tuple[int, int]:

@@ -88,8 +88,11 @@ class Result(InWords):
 
     @classmethod
     def restored(cls, given: Any) -> Self:
-        """What `stored` gave, nothing computed; InputError, one line, for what is damaged or of another version."""
-        return restored(given, cls)
+        """What `stored` gave, nothing computed; InputError, one line, for what is damaged or of another version.
+
+        What cannot be told of it is damaged, too.
+        """
+        return restored(given, cls, lambda found: (found.to_dict(), str(found.document)))
 
     @property
     def lines(self) -> list[str]:
@@ -312,10 +315,15 @@ def stored(value: Any) -> Any:
     return _stored_whole(value, {})
 
 
-def restored(given: Any, kind: type[Kind]) -> Kind:
-    """What `stored` gave of a value of a type.  InputError, one line, for what is damaged or of another version."""
+def restored(given: Any, kind: type[Kind], told: Callable[[Kind], object] = lambda found: None) -> Kind:
+    """What `stored` gave of a value of a type.  InputError, one line, for what is damaged or of another version.
+
+    told(found): what it must be able to tell, as its parts may not fit each other; any error says that they do not.
+    """
     try:
-        return _restored_whole(given, kind, [])
+        found = _restored_whole(given, kind, [])
+        told(found)
+        return found
     except InputError:
         raise
     except (ArithmeticError, AttributeError, LookupError, RecursionError, TypeError, ValueError) as error:

@@ -187,14 +187,20 @@ class StoredRace:
     @classmethod
     def of(cls, given: Any) -> StoredRace:
         """What was stored; InputError for what is damaged, or of another version."""
-        found = restored(given, cls)
-        ended = [one.answer is not None and one.last is not None and one.rmse for one in found.tracks.values()]
-        each = [one for track in found.tracks.values() for one in (track.k, track.current_A) if one is not None]
-        fits = ended and all(ended) and {*found.tracks} <= {*ALGORITHMS}
-        fits = fits and {len(one) for one in each} <= {len(NAMES), len(found.time_s)}
-        if not (fits and len(found.time_s) == len(found.measured_A)):
-            raise InputError("it is damaged")
-        return found
+        return restored(given, cls, StoredRace._check)
+
+    def _check(self) -> None:
+        """Whatever is raised says that parts do not fit each other."""
+        tracks = self.tracks.values()
+        ended = [one.answer is not None and one.last is not None and bool(one.rmse) for one in tracks]
+        lengths = {len(one.current_A) for one in tracks if one.current_A is not None}
+        fits = ended and all(ended) and {*self.tracks} <= {*ALGORITHMS}
+        fits = fits and {len(one.k) for one in tracks if one.k is not None} == {len(NAMES)}
+        if not (fits and lengths <= {len(self.time_s)} == {len(self.measured_A)}):
+            raise ValueError("parts that do not fit each other")
+        for one in tracks:
+            _ = one.answer and (one.answer.to_dict(), str(one.answer.document))
+        datetime.fromisoformat(self.at)
 
 
 def target(
@@ -455,15 +461,11 @@ class Identifying:
         settings = Settings(axes=self._monitor.axes)
         settings.restore(given.get("settings"))
         one = StoredRace.of(given.get("race"))
-        try:
-            at = datetime.fromisoformat(one.at)
-        except ValueError:
-            raise InputError("it is damaged") from None
         path = self._folder / Path(one.recording).name
         own = {each.name: getattr(one, each.name) for each in fields(one) if each.name in Race.__dataclass_fields__}
         race = Race(settings, **own, path=path if one.recording and path.is_file() else None)
         assert race.best is not None, "each track has an answer"
-        self.answer, self.answered_at, self.race = race.best.answer, at, race
+        self.answer, self.answered_at, self.race = race.best.answer, datetime.fromisoformat(one.at), race
         self.brought(race)
 
     def _story(self, race: Race, measurement: Measurement) -> IdentificationStory | None:

@@ -75,16 +75,18 @@ class StoredFlights:
     def of(cls, given: Any) -> StoredFlights:
         """What was stored; InputError for what is damaged."""
         try:
-            found = restored(given, cls)
-            good = all(map(_makes_sense, found.flights))
-            if (history := found.history) is not None:
-                good = good and [*map(id, history.flights)] == [*map(id, found.flights)]
-                _ = None if history.last is None else (history.last.document, history.last.to_dict())
-        except (ArithmeticError, AttributeError, InputError, LookupError, TypeError, ValueError):
-            good = False
+            return restored(given, cls, StoredFlights._check)
+        except InputError:
+            raise InputError(f"the session's {_PART} is damaged (its flights make no sense); save it anew") from None
+
+    def _check(self) -> None:
+        """Whatever is raised says that parts do not fit each other."""
+        good = all(map(_makes_sense, self.flights))
+        if (history := self.history) is not None:
+            good = good and [*map(id, history.flights)] == [*map(id, self.flights)]
+            _ = history.last and (str(history.last.document), history.last.to_dict())
         if not good:
-            raise InputError(f"the session's {_PART} is damaged (its flights make no sense); save it anew")
-        return found
+            raise ValueError("parts that do not fit each other")
 
 
 def _makes_sense(one: Flight) -> bool:

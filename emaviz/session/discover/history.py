@@ -190,16 +190,14 @@ class StoredStory:
     @classmethod
     def of(cls, given: Any) -> StoredStory:
         """What `Telling.stored` gave; InputError for what is damaged, or of another version."""
-        found = restored(given, cls)
-        try:
-            shapes = {len(found.look.residuals.time_s), len(found.look.counts)}
-            whole = len(shapes) == 1 and 0 < len(found.story.steps) == found.look.steps
-            _ = found.look.found.to_dict(), found.look.found.document, found.look.removable
-        except (ArithmeticError, AttributeError, LookupError, TypeError, ValueError):
-            whole = False
-        if not whole:
-            raise InputError("it is damaged")
-        return found
+        return restored(given, cls, StoredStory._check)
+
+    def _check(self) -> None:
+        """Whatever is raised says that parts do not fit each other."""
+        look = self.look
+        _ = look.found.to_dict(), str(look.found.document), look.removable
+        if len(look.residuals.time_s) != len(look.counts) or not 0 < len(self.story.steps) == look.steps:
+            raise ValueError("parts that do not fit each other")
 
     def told(self, recipe: Recipe) -> Telling:
         """As it was, without what each candidate was scored with."""

@@ -458,7 +458,7 @@ def drawn(tab):
             props = {} if impl is None else {name: getattr(impl.props, name, None) for name in SHOWN}
             found[path] = {**props, "value": getattr(impl, "value", None)}
             return
-        elif type(of).__module__.startswith("emaviz.page.") and hasattr(of, "__dict__"):
+        elif type(of).__module__.startswith(("emaviz.page.", "emaviz.figures.")) and hasattr(of, "__dict__"):
             parts = vars(of).items()
         else:
             return

@@ -27,7 +27,7 @@ from ema_model.quantities.numbers import number
 from ema_model.quantities.titles import in_sentence
 from ema_model.result import restored, stored
 from emaviz.session.discover.source import DiscoverySource, Recipe, SavedStory, story_of
-from emaviz.session.inputs import Inputs, Room
+from emaviz.session.inputs import Inputs, Room, digest
 from emaviz.session.jobs import Signal, Tell, aside
 
 # --- candidates refitted in the model of a story, each once -----------------------------------------------------------
@@ -224,10 +224,15 @@ class Entry:
     inputs: Inputs | None = None  # of the story
     says: str = "not opened yet"  # while there is no picture
     lost: str = ""  # why its story is not here
+    steps_digest: str = ""  # likewise, of its steps
 
     def saved(self) -> SavedStory:
         """As a session's file says it; the story stands beside."""
-        return SavedStory(self.recipe, self.revealed, self.result, self.number, self.at, self.inputs)
+        steps = self.steps_digest
+        if self.told is not None and self.look is not None:
+            ladder = [(one.change, one.rmse, one.holdout_rmse) for one in self.look.found.ladder]
+            steps = digest((ladder, self.told.experiment))
+        return SavedStory(self.recipe, self.revealed, self.result, self.number, self.at, self.inputs, steps)
 
     @property
     def subject(self) -> str:
@@ -335,7 +340,7 @@ class Entries:
         if saved.number and all(one.number != saved.number for one in self.all):
             entry.number = saved.number
         entry.challenge, entry.revealed, entry.inputs = challenge, saved.revealed, saved.inputs
-        entry.at, entry.says = saved.at or entry.at, saved.says
+        entry.at, entry.says, entry.steps_digest = saved.at or entry.at, saved.says, saved.steps_digest
         if story is None:
             entry.lost = "its steps are not in this session"
             return entry

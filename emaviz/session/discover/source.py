@@ -80,6 +80,7 @@ class SavedStory(msgspec.Struct, frozen=True):
     number: Annotated[int, msgspec.Meta(ge=0, lt=1_000_000)] = 0
     at: datetime | None = None
     inputs: Inputs | None = None  # of the story
+    steps_digest: str = ""  # by which the same steps are known again
     others: tuple[SavedStory, ...] = ()
 
     def renamed(self, names: Mapping[str, str]) -> SavedStory:

@@ -25,7 +25,7 @@ from emaviz.session.data_folder import DataFolder
 from emaviz.session.discover.discovering import Discovering
 from emaviz.session.explore import Session
 from emaviz.session.fleet import ComparingUnits
-from emaviz.session.inputs import Inputs, Provenance, results_part
+from emaviz.session.inputs import Inputs, Provenance, results_part, version_of
 from emaviz.session.jobs import Job, Worker
 from emaviz.session.jobs import Run as JobRun
 from emaviz.session.session_file import Part
@@ -252,6 +252,19 @@ def test_a_session_says_what_must_be_computed_again_and_what_to_press(app, tab):
     assert results_part(lambda: members(app)).save() == saved, "saved again before it is computed, it is not lost"
     provenance.take()
     assert provenance.line() == ""
+
+
+def test_a_file_is_known_again_by_what_is_in_it(tmp_path):
+    """Also where a session has taken it to another folder, and where it was written again as it was."""
+    one, other = tmp_path / "a.csv", tmp_path / "elsewhere.csv"
+    one.write_text("time_s,current_A\n0,1\n")
+    other.write_bytes(one.read_bytes())
+    os.utime(other, ns=(1, 1))
+    assert version_of(one) == version_of(other) != ""
+    other.write_text("time_s,current_A\n0,2\n")  # of the same length
+    os.utime(other, ns=(2, 2))
+    assert version_of(one) != version_of(other) and version_of(tmp_path / "none.csv") == ""
+    assert version_of(one, "read so") != version_of(one, "read otherwise")
 
 
 def test_what_was_running_is_said_too(app):

@@ -438,6 +438,38 @@ def test_a_session_is_saved_and_loaded_with_all_that_is_on_the_page(page, app, t
     settings.restore(Settings().saved())
 
 
+def with_arrays(folder, name, saved):
+    """What is in the zip of a session, and what is read from it."""
+    back, path = [], session_file.free_path(folder, name)
+    session_file.write_session(path, {"a": Part(lambda: saved, lambda *_: None)}, folder, [])
+    session_file.read_session(path, {"a": Part(dict, lambda given, _: back.append(given))}, folder)
+    with zipfile.ZipFile(path) as archive:
+        return {one: archive.read(one) for one in archive.namelist()}, back[0]
+
+
+def test_each_array_is_in_a_session_once_and_comes_back_in_all_places(folder):
+    one = np.arange(1000.0)
+    saved = {"a": one, "b": [one.copy(), one[::2]], "c": np.zeros((0, 3)), "d": np.array([True, False]), "e": 7}
+    files, back = with_arrays(folder, "once", saved)
+    assert len(files["arrays.bin"]) == 8000 + 4000 + 2
+    assert np.array_equal(back["a"], one) and back["a"] is back["b"][0] and np.array_equal(back["b"][1], one[::2])
+    assert back["c"].shape == (0, 3) and back["d"].dtype == bool and back["e"] == 7
+
+
+def test_arrays_that_are_more_than_a_session_holds_are_refused(folder, tmp_path, monkeypatch):
+    """A small file whose notes ask for the same bytes again and again, each time in another shape."""
+    files, _ = with_arrays(folder, "bomb", {"a": np.arange(1000.0)})
+    document = json.loads(files["session.json"])
+    document["a"] = [{"__array__": ["<f8", [1000 - i], 0]} for i in range(100)]
+    archive_with(tmp_path / "bomb.emaviz", {**files, "session.json": json.dumps(document)})
+    monkeypatch.setattr(session_file, "SESSION_BYTES", 100_000)
+    with pytest.raises(InputError, match="its arrays do not fit"):
+        session_file.read_session(tmp_path / "bomb.emaviz", {}, folder)
+    with pytest.raises(InputError, match="too large to be opened again"):
+        with_arrays(folder, "large", {"a": np.arange(20_000.0)})
+    assert folder.session_files() == ["sessions/bomb.emaviz"], "nothing is left behind"
+
+
 # --- a whole page, in an app that has computed nothing ----------------------------------------------------------------
 
 

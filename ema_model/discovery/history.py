@@ -331,8 +331,8 @@ class Story:
         return replace(
             self,
             steps=[replace(step, settled_from=None) for step in self.steps],
-            calm={one: one for one in self.calm.values() if one in fits},
-            shown={found: one for found, one in self.shown.items() if found in fits},
+            calm={one: one for one in [*self.calm.values()] if one in fits},
+            shown={found: one for found, one in [*self.shown.items()] if found in fits},
         )
 
     @property

@@ -234,7 +234,7 @@ class Provenance:
         job, missing = self._job, self.missing
         running = "" if job is None or not (job.running or job.waiting) else job.title
         if missing is not None:
-            return SavedResult(missing.inputs, running or missing.running)
+            return SavedResult(missing.inputs or self.of, running or missing.running)
         return SavedResult(self.of, running) if self.of is not None or running else None
 
     def restored(self) -> None:
@@ -263,7 +263,7 @@ class Provenance:
             self._is_whole = whole is not None
         is_here = inputs is not None and self.of is not None and not self.of.changed(inputs)
         if saved.running or not is_here:
-            self.missing = SavedResult(inputs, saved.running)
+            self.missing = SavedResult(None if is_here else inputs, saved.running)
 
 
 def results_part(members: Callable[[], Mapping[str, Provenance]]) -> Part:

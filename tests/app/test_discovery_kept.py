@@ -195,6 +195,11 @@ def test_recordings_of_compare_are_shown_again_with_what_was_asked(rigs, tmp_pat
     there.comparing.set_window(0.0, 0.3)
     there.comparing.set_free("motor.inertia_kgm2", False)
     assert there.discovering.provenance.line() == "", "the same files, by what is in them, and the same asked of them"
+    assert not [one for one in there.discovering.entries.all if one.look is None], "the others came whole, too"
+    now, other = there.discovering.entries.current, there.discovering.entries.all[0]
+    there.discovering.show(other)
+    assert other is not now and there.discovering.look is other.look and not there.discovering.running
+    there.discovering.show(now)
     here.comparing.window_s = None
 
 

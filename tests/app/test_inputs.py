@@ -279,6 +279,21 @@ def test_what_was_running_is_said_too(app):
     )
 
 
+def test_a_result_that_is_here_is_not_said_to_be_missing_for_what_was_running_beside_it(app):
+    job, provenance = app.units.job, app.units.provenance
+    provenance.take()
+    job.running, job._run = True, JobRun("Comparing units", print, app.session.worker)
+    saved = results_part(lambda: members(app)).save()
+    job.running = False
+    provenance.clear()
+    provenance.restored()
+    brought(app, saved)
+    assert provenance.line() == (
+        "Not computed: “Comparing units” was running when this session was saved; press Compare units."
+    )
+    assert results_part(lambda: members(app)).save() == saved
+
+
 def test_a_result_that_a_session_brings_itself_keeps_what_it_is_of(app):
     provenance = app.units.provenance
     provenance.take()

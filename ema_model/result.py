@@ -310,6 +310,11 @@ class MadeOf(Protocol):
         ...
 
 
+_DAMAGED = (
+    ArithmeticError, AssertionError, AttributeError, LookupError, MemoryError, RecursionError, TypeError, ValueError
+)  # fmt: skip
+
+
 def stored(value: Any) -> Any:
     """A dataclass and all that it holds, as plain values and arrays.  InputError for what has none."""
     return _stored_whole(value, {})
@@ -326,7 +331,7 @@ def restored(given: Any, kind: type[Kind], told: Callable[[Kind], object] = lamb
         return found
     except InputError:
         raise
-    except (ArithmeticError, AttributeError, LookupError, RecursionError, TypeError, ValueError) as error:
+    except _DAMAGED as error:
         raise InputError(
             f"it was stored by another version, or is damaged ({quoted(error, 80)}); compute it anew"
         ) from None

@@ -228,6 +228,17 @@ def test_damaged_parts_are_told_in_one_line_and_change_nothing(rigs, solved):
     assert there.discovering.look is before and not there.discovering.running
 
 
+def every(stored, kind):
+    """The stored objects of a class, at any depth."""
+    if isinstance(stored, dict):
+        if stored.get("class") == kind:
+            yield stored
+        stored = list(stored.values())
+    if isinstance(stored, list):
+        for one in stored:
+            yield from every(one, kind)
+
+
 def damaged(story):
     """Stories that were tampered with, by what is wrong with them."""
 
@@ -244,12 +255,16 @@ def damaged(story):
     yield "another class", {**story, "class": "Path"}
     yield "a class of another place", changed((*steps, 0, "class"), "Discovery")
     yield "no steps", changed(steps, [])
-    yield "fewer steps than are shown", changed(steps, copy.deepcopy(story)["fields"]["story"]["fields"]["steps"][:1])
+    yield "fewer steps than are shown", changed(steps, copy.deepcopy(story)["fields"]["story"]["fields"]["steps"][:-1])
     yield "a reference to nothing", changed((*steps, 0, "fields", "fit"), {"same": 99999})
     yield "a reference to another kind", changed((*steps, 0, "fields", "fit"), {"same": 0})
     yield "text for numbers", changed(("fields", "look", "fields", "chi2"), "many")
     yield "an array of another length", changed(("fields", "look", "fields", "counts"), np.zeros(3))
     yield "another field", changed(("fields", "look", "fields", "more"), 1)
+    endless = copy.deepcopy(story)
+    for one in every(endless, "Actuator"):
+        one["fields"]["step_s"] = 1e-15
+    yield "a model that would fill the memory", endless
     deep = []
     for _ in range(100_000):
         deep = [deep]

@@ -195,8 +195,13 @@ class StoredStory:
     def _check(self) -> None:
         """Whatever is raised says that parts do not fit each other."""
         look = self.look
-        _ = look.found.to_dict(), str(look.found.document), look.removable
-        if len(look.residuals.time_s) != len(look.counts) or not 0 < len(self.story.steps) == look.steps:
+        _ = look.found.to_dict(), str(look.found.document), look.removable, look.primary
+        blocks = sum(one.blocks for one in look.found.plant.windows)  # which are drawn at once
+        if (
+            blocks != len(look.counts)
+            or len(look.residuals.time_s) != len(look.counts)
+            or not 0 < len(self.story.steps) == look.steps
+        ):
             raise ValueError("parts that do not fit each other")
 
     def told(self, recipe: Recipe) -> Telling:

@@ -137,6 +137,7 @@ class Provenance:
         self.whole: Whole | None = None  # where its tab does not save it among its own
         self._job, self._soon, self._reads = job, soon, reads
         self._why = ""  # what is missing could not be brought
+        self._is_lost = False  # it was missing before a session was saved, or without one
         self._restored = False  # a session brought the result itself
         self._is_whole = False  # it is shown as a session brought it, while its files may still be read
         self._coming: Inputs | None = None  # of the run that goes on
@@ -165,12 +166,12 @@ class Provenance:
     def lose(self, of: Inputs | None, why: str) -> None:
         """A result that was there is not: it is to be computed again."""
         self.clear()
-        self.missing, self._why = SavedResult(of), why
+        self.missing, self._why, self._is_lost = SavedResult(of), why, True
 
     def clear(self) -> None:
         """Nothing is shown any more."""
         self.of = self.missing = self._error = None
-        self._is_whole, self._why = False, ""
+        self._is_whole, self._why, self._is_lost = False, "", False
 
     def _ended(self, job: Job) -> None:
         if job.error:
@@ -211,7 +212,8 @@ class Provenance:
             if not had:
                 return f"Not computed: {running}; {press}."
             why = f" ({self._why})" if self._why else ""
-            again = f"To be computed again: {had}, which this session was saved with{why}; {press}."
+            saved = "" if self._is_lost else ", which this session was saved with"
+            again = f"To be computed again: {had}{saved}{why}; {press}."
             return f"{again} {running}." if running else again
         if self.of is None:
             return ""
@@ -253,7 +255,7 @@ class Provenance:
                 self.restored()
             except InputError as error:
                 self._why = str(error)
-        restored, self._restored = self._restored, False
+        restored, self._restored, self._is_lost = self._restored, False, False
         self.missing = self._error = None
         if saved is None:
             return
@@ -286,14 +288,14 @@ def results_part(members: Callable[[], Mapping[str, Provenance]]) -> Part:
 
 
 _MOST_BYTES = 100_000_000  # of one tab's arrays
-_MOST_TEXT = 2_000_000  # of all else in it, as a file has it
+_MOST_TEXT = 1_000_000  # of all else in it, as a file has it: together they stay below what is read
 
 
 class Room:
     """What the results of one tab may take of a session's file; one that finds no room is computed again."""
 
-    def __init__(self) -> None:
-        self._arrays, self._text = _MOST_BYTES, _MOST_TEXT
+    def __init__(self, text: int = _MOST_TEXT) -> None:
+        self._arrays, self._text = _MOST_BYTES, text
 
     def take(self, found: Any) -> Any:
         """A stored result; InputError for one that is too large."""

@@ -293,8 +293,7 @@ def test_a_session_of_before_stories_were_stored_says_what_is_to_be_computed_aga
         old = {"recipe": {"challenge": EASY}, "steps": [{"model": "x", "starts": {}}], "says": "1 added, 1.02 × floor"}
         rig.discovering.restore({**old, "others": [old], "experiment": None}, {})
         assert rig.discovering.provenance.line() == (
-            "To be computed again: the discovery of First bench run, which this session was saved with "
-            "(its steps are not in this session); press Start."
+            "To be computed again: the discovery of First bench run (its steps are not in this session); press Start."
         )
         assert len(rig.discovering.entries.all) == 2 and not rig.ended and not rig.told
         assert all("1 added, 1.02 × floor" in one.words for one in rig.discovering.entries.all)

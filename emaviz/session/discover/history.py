@@ -265,6 +265,7 @@ class Entry:
 WHOLE = 3  # discoveries that go on at once: what each has scored takes 150 MB
 KEPT = 12  # that are gone back to, with all of their steps: each takes tens of MB
 _MOST_BROUGHT = 50  # by a session's file
+_MOST_TEXT = 3_500_000  # that stories are in it, beside their arrays: of fifty steps
 
 
 class Entries:
@@ -299,7 +300,7 @@ class Entries:
         self._kept = [*(one for one in self._kept if one is not entry and one.told is not None), entry]
         for one in self._kept[:-KEPT]:
             one.says, one.told, one.look = one.result, None, None
-            one.lost = f"the last {KEPT} discoveries are kept"
+            one.lost = f"the last {KEPT} are kept"
         self._kept = self._kept[-KEPT:]
         for one in self._kept[:-WHOLE]:
             if one.told is not None:
@@ -312,7 +313,7 @@ class Entries:
             return None
         if current is self.current:
             current.revealed = self._source.revealed
-        room, rest = Room(), [one for one in reversed(self.all) if one is not current]
+        room, rest = Room(_MOST_TEXT), [one for one in reversed(self.all) if one is not current]
         first, *others = (self._saved(one, room) for one in (current, *rest))
         return {**first, "others": others}
 

@@ -263,13 +263,13 @@ class Store:
     def packed(self) -> Packed:
         """All that the folder holds; InputError where it cannot be read."""
         try:
-            plan, actuators = self._text("plan.toml"), sorted((self.folder / "actuators").glob("*.toml"))
-            texts = {path.stem: path.read_text(encoding="utf-8") for path in actuators}
-        except OSError as error:
-            raise refusal(self.folder, f"cannot be read ({error.strerror})") from None
+            files = sorted((self.folder / "actuators").glob("*.toml"))
+            texts = {path.stem: path.read_text(encoding="utf-8") for path in files}
+        except (OSError, UnicodeDecodeError) as error:
+            raise refusal(self.folder, f"cannot be read ({reason(error)})") from None
         tables = {kind: self.table(kind, how=True).to_pylist() for kind in sorted(set(self.header.kinds.values()))}
         rows = {kind: np.frombuffer(json.dumps(one).encode(), np.uint8) for kind, one in tables.items() if one}
-        return Packed(self.header, plan, texts, rows)
+        return Packed(self.header, self.plan, texts, rows)
 
     @classmethod
     def unpacked(cls, folder: Path, packed: Packed) -> Store:
@@ -294,8 +294,13 @@ class Store:
             raise InputError(f"the session's campaign is damaged ({quoted(error, 100)}); save it anew") from None
         return store
 
-    def _text(self, name: str) -> str:
-        return (self.folder / name).read_text(encoding="utf-8")
+    @property
+    def plan(self) -> str:
+        """The plan's text; InputError where it cannot be read."""
+        try:
+            return (self.folder / "plan.toml").read_text(encoding="utf-8")
+        except (OSError, UnicodeDecodeError) as error:
+            raise refusal(self.folder / "plan.toml", f"cannot be read ({reason(error)})") from None
 
     def _parts(self, kind: str) -> list[Path]:
         return sorted((self.folder / "parts").glob(f"{kind}-*.parquet"))

@@ -142,7 +142,7 @@ class CampaignControls:
 
     def _reports(self, name: str) -> Html:
         """A link to what was written of it."""
-        if self._campaigns.report(f"{name}/{REPORT}") is None:
+        if not self._campaigns.has_report(name):
             return Html()
         at = f"{RESULTS}{quote(name)}/{REPORT}"
         return html('<div class="emaviz-report"><a href="{}" target="_blank" rel="noopener">Report ↗</a></div>', at)

@@ -29,7 +29,7 @@ from ema_model.files.opened import shown
 from ema_model.identification.run import Progress, identify
 from ema_model.identification.search import Objective
 from ema_model.recordings import Measurement
-from ema_model.result import restored, stored
+from ema_model.result import Result, restored, stored
 from emaviz.session.data_folder import DataFolder
 from emaviz.session.explore import Session
 from emaviz.session.inputs import Inputs, Room, digest
@@ -64,6 +64,7 @@ class SavedCampaign(msgspec.Struct, frozen=True):
     """What a session's file says of the campaign that is shown; its folder stands beside."""
 
     name: str
+    report: bool = False  # whether one was written
 
 
 class Campaigns:
@@ -76,6 +77,7 @@ class Campaigns:
         self.grown: Signal[[str]] = Signal()  # name of a campaign that has begun, or has rows more
         self.written: Signal[[str, list[Path]]] = Signal()  # such a name, and its report, and a recording
         self._recorded: tuple[Path, Measurement, str] | None = None
+        self._said: set[Path] = set()  # folders of which a session says that they had a report
         self._session, self._data = session, data
         self._given = [Store(path).folder for path in given]
 
@@ -91,10 +93,22 @@ class Campaigns:
         return Store(folders[name])
 
     def report(self, name: str) -> Path | None:
-        """A campaign's report, by its campaign's name and its own, or None; of the data folder alone."""
+        """A campaign's report, by its campaign's name and its own, or None; of the data folder alone.
+
+        One that a session said to be there is written now.
+        """
         path = self._data.folder / name
         fits = path.name == REPORT and self._data.holds(path) and (path.parent / _HEADER).is_file()
+        if fits and not path.is_file() and path.parent in self._said:
+            with suppress(InputError):
+                store = Store(path.parent)
+                _result(store, any(store.plan == load_plan(one).text for one in _THESIS)).export(path)
         return path if fits and path.is_file() else None
+
+    def has_report(self, name: str) -> bool:
+        """Whether there is one, or a session said so."""
+        folder = self._folders().get(name)
+        return folder is not None and self._data.holds(folder) and ((folder / REPORT).is_file() or folder in self._said)
 
     def inputs(self, name: str) -> Inputs:
         """What a campaign's tables are made from now."""
@@ -108,9 +122,10 @@ class Campaigns:
         """The campaign of that name with its rows, for a session's file; its name alone where there is no room."""
         if name not in self._folders():
             return None
+        told: dict[str, Any] = {"name": name, "campaign": None, "report": self.has_report(name)}
         with suppress(InputError):
-            return {"name": name, "campaign": Room().take(stored(self.store(name).packed()))}
-        return {"name": name, "campaign": None}
+            told["campaign"] = Room().take(stored(self.store(name).packed()))
+        return told
 
     def restore(self, saved: Any) -> str:
         """Takes a session's into the data folder, unless it is there; its name.  InputError for what makes no sense."""
@@ -133,6 +148,8 @@ class Campaigns:
             if not self._data.holds(folder):
                 break
             Store.unpacked(folder, packed)
+            if told.report:
+                self._said.add(folder)
             return name
         raise InputError(f"{shown(stem, 60)}: too many campaigns have this name; remove some")
 
@@ -203,17 +220,14 @@ class Campaigns:
 
     def _write(self, asked: Computing, store: Store) -> list[Path]:
         """The report, in the campaign's folder; beside the thesis also a recording, where the viewer finds it."""
-        path = store.folder / REPORT
+        path, found = store.folder / REPORT, _result(store, asked.reproduces)
+        found.export(path)
         if not asked.reproduces:
-            Campaign(store).export(path)
             return [path]
-        from ema_model.campaign.thesis import Evaluation, drawn
         from emaviz.recording.entry import free_name  # rerun takes a second to import
 
-        found = Evaluation(store, drawn(load_actuator()))
         recording = free_name(self._session.folder, asked.name, ".rrd")
-        for one in (path, recording):
-            found.export(one)
+        found.export(recording)
         return [path, recording]
 
     # --- a row as a run ---------------------------------------------------------------------------------------------
@@ -255,6 +269,15 @@ class Campaigns:
         path, run, said = self._recorded
         self.opened(path, run)
         return said
+
+
+def _result(store: Store, reproduces: bool) -> Result:
+    """Of a campaign's rows: beside the thesis where they are its evaluation's."""
+    if not reproduces:
+        return Campaign(store)
+    from ema_model.campaign.thesis import Evaluation, drawn
+
+    return Evaluation(store, drawn(load_actuator()))
 
 
 def _is_same(one: Store, other: Packed) -> bool:

@@ -20,7 +20,7 @@ from ema_model.errors import InputError
 from emaviz.page.campaigns import figures, label, progress_bars, tables
 from emaviz.recording import read
 from emaviz.session import session_file
-from emaviz.session.campaigns import Campaigns
+from emaviz.session.campaigns import REPORT, Campaigns
 from emaviz.session.data_folder import DataFolder
 from emaviz.session.explore import Session
 from emaviz.session.session_file import Part
@@ -168,8 +168,14 @@ def test_a_session_brings_its_campaign_to_another_folder(session, data, tmp_path
     other = Campaigns(Session(load_actuator(), there.recordings), there)
     campaigns = Campaigns(session, data)
     before = drawn(campaigns.store("campaigns/first"))
+    Campaign(campaigns.store("campaigns/first")).export(data.folder / "campaigns" / "first" / REPORT)
+    assert campaigns.has_report("campaigns/first")
     saved = through_a_file(there, campaigns.saved("campaigns/first"), "campaign")
+    computed.clear()
     assert other.restore(saved) == "campaigns/first" and other.names() == ["campaigns/first"]
+    assert other.has_report("campaigns/first") and not (there.folder / "campaigns" / "first" / REPORT).exists()
+    report = other.report(f"campaigns/first/{REPORT}")
+    assert report is not None and report.read_text().startswith("<!"), "written when it is asked for"
     assert drawn(other.store("campaigns/first")) == before and not computed
     assert other.restore(saved) == "campaigns/first" and len(other.names()) == 1, "it is there"
     assert campaigns.restore(saved) == "campaigns/first" and len(campaigns.names()) == 1, "where it was saved, too"

@@ -330,17 +330,18 @@ def version_of(path: Path, *said: object) -> str:
     """By which a file is known again, elsewhere too, with what was said of how to read it; '' where it is not there."""
     try:
         at = path.stat()
-        own = str(at.st_mtime_ns) if at.st_size > _MOST_READ else _digest_of(path, at.st_size, at.st_mtime_ns)
     except OSError:
         return ""
+    own = str(at.st_mtime_ns) if at.st_size > _MOST_READ else _digest_of(path, at.st_size, at.st_mtime_ns)
     return " ".join((str(at.st_size), own, *(digest(one) for one in said)))
 
 
 @lru_cache(maxsize=20_000)
 def _digest_of(path: Path, size: int, changed_ns: int) -> str:
-    """Of what is in a file; it is read again once it has another size, or was written since."""
-    with path.open("rb") as file:
+    """Of what is in a file, which is read again once it has another size, or was written since; else when it was."""
+    with suppress(OSError), path.open("rb") as file:
         return hashlib.file_digest(file, lambda: hashlib.blake2b(digest_size=16)).hexdigest()
+    return str(changed_ns)
 
 
 def version_with_side(path: Path) -> str:

@@ -9,15 +9,20 @@ import numpy as np
 import pytest
 from support.on_page import wait_until
 from support.rig import Rig
+from support.unknown_drive import drive_of, logged
 
 from ema_model.actuator import load_actuator
+from ema_model.discovery import begun
 from ema_model.discovery.result import Experiment
 from ema_model.effects.user import user_torque
 from ema_model.errors import InputError
 from emaviz.page.discover import candidate
 from emaviz.page.discover.result import answer
-from emaviz.session.discover.history import KEPT, WHOLE, Entries
-from emaviz.session.discover.source import agrees, document_of, sensors_of, truth_of
+from emaviz.session import session_file
+from emaviz.session.data_folder import DataFolder
+from emaviz.session.discover.history import KEPT, WHOLE, Entries, StoredStory, Telling
+from emaviz.session.discover.source import Recipe, agrees, document_of, sensors_of, truth_of
+from emaviz.session.session_file import Part
 from emaviz.session.settings import Settings
 
 EASY = "first_bench_run"
@@ -226,6 +231,39 @@ def test_damaged_parts_are_told_in_one_line_and_change_nothing(rigs, solved):
             there.discovering.restore(saved, names)
         assert "\n" not in str(told.value)
     assert there.discovering.look is before and not there.discovering.running
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("kind", ["unknown", "open"])
+def test_a_story_without_a_controller_is_stored_as_well(folder_of, tmp_path, kind):
+    """By inverse dynamics, and in an open loop, whose windows and models are others."""
+    actuator = drive_of(tmp_path, kind == "unknown", kind)
+    recordings = [
+        logged(seed, hidden=lambda angle, _: 0.01 * np.sin(7.0 * angle), name=f"{seed}") for seed in (1, 2, 3)
+    ]
+    story = begun(recordings[:2], actuator, recordings[2:], None, lambda _: None)
+    told = Telling(story, Recipe())
+    told.assess()
+    told.add(told.trials.of(story, told.look().promising[0], lambda _: None), (), lambda _: None)
+    told.assess()
+    look, back = told.look(), []
+    path = session_file.free_path(folder_of, kind)
+    session_file.write_session(path, {"d": Part(lambda: told.stored(look), lambda *_: None)}, folder_of, [])
+    session_file.read_session(path, {"d": Part(dict, lambda given, _: back.append(given))}, folder_of)
+    found = StoredStory.of(back[0])
+    again = found.told(Recipe()).look()  # made anew of its steps
+    for one in (found.look, again):
+        assert one.found.to_dict() == look.found.to_dict() and str(one.found) == str(look.found)
+        assert [str(figure.to_json()) for figure in one.found.figures()] == [
+            str(figure.to_json()) for figure in look.found.figures()
+        ]
+    assert type(found.look.found.plant) is type(look.found.plant) and found.look.found.plant is not look.found.plant
+    assert [one.name for one in found.look.promising] == [one.name for one in look.promising]
+
+
+@pytest.fixture
+def folder_of(tmp_path):
+    return DataFolder(tmp_path / "data")
 
 
 def every(stored, kind):

@@ -15,7 +15,20 @@ from importlib.metadata import entry_points
 from operator import attrgetter
 from pathlib import Path
 from types import NoneType, UnionType
-from typing import Annotated, Any, Literal, Protocol, Self, TypedDict, Union, cast, get_args, get_origin, get_type_hints
+from typing import (
+    Annotated,
+    Any,
+    Literal,
+    Protocol,
+    Self,
+    TypedDict,
+    TypeVar,
+    Union,
+    cast,
+    get_args,
+    get_origin,
+    get_type_hints,
+)
 
 import msgspec
 import numpy as np
@@ -25,6 +38,8 @@ from ema_model.errors import InputError, quoted
 from ema_model.files.written import write_text
 from ema_model.quantities.numbers import plain
 from ema_model.text import InWords, Lines
+
+Kind = TypeVar("Kind")
 
 VIEWS = "ema_model.views"  # the group of entry points of packages that show results
 
@@ -69,19 +84,15 @@ class Result(InWords):
 
     def stored(self) -> dict[str, Any]:
         """All its fields, series too: plain values and arrays.  InputError for a result that holds what has none."""
-        return _stored_whole(self, {})
+        return stored(self)
 
     @classmethod
     def restored(cls, given: Any) -> Self:
-        """What `stored` gave, nothing computed; InputError, one line, for what is damaged or of another version."""
-        try:
-            return _restored_whole(given, cls, [])
-        except InputError:
-            raise
-        except (ArithmeticError, AttributeError, LookupError, RecursionError, TypeError, ValueError) as error:
-            raise InputError(
-                f"it was stored by another version, or is damaged ({quoted(error, 80)}); compute it anew"
-            ) from None
+        """What `stored` gave, nothing computed; InputError, one line, for what is damaged or of another version.
+
+        What cannot be told of it is damaged, too.
+        """
+        return restored(given, cls, lambda found: (found.to_dict(), str(found.document)))
 
     @property
     def lines(self) -> list[str]:
@@ -291,22 +302,61 @@ def _array(kind: Any, given: Any) -> Any:
 # --- a result whole, as a session stores it: each dataclass by its fields, each object once ---------------------------
 
 
+class MadeOf(Protocol):
+    """What is stored by the parts that it is made of, a dataclass with `made()`, which the type of `made_of` names."""
+
+    def made_of(self) -> Any:
+        """Of which the same is made again."""
+        ...
+
+
+_DAMAGED = (
+    ArithmeticError, AssertionError, AttributeError, LookupError, MemoryError, RecursionError, TypeError, ValueError
+)  # fmt: skip
+
+
+def stored(value: Any) -> Any:
+    """A dataclass and all that it holds, as plain values and arrays.  InputError for what has none."""
+    return _stored_whole(value, {})
+
+
+def restored(given: Any, kind: type[Kind], told: Callable[[Kind], object] = lambda found: None) -> Kind:
+    """What `stored` gave of a value of a type.  InputError, one line, for what is damaged or of another version.
+
+    told(found): what it must be able to tell, as its parts may not fit each other; any error says that they do not.
+    """
+    try:
+        found = _restored_whole(given, kind, [])
+        told(found)
+        return found
+    except InputError:
+        raise
+    except _DAMAGED as error:
+        raise InputError(
+            f"it was stored by another version, or is damaged ({quoted(error, 80)}); compute it anew"
+        ) from None
+
+
 def _stored_whole(value: Any, known: dict[int, int]) -> Any:
-    """Plain values and arrays; known: the places of dataclasses that are stored, by their id."""
+    """Plain values and arrays; known: the places of objects that are stored, by their id."""
     if value is None or isinstance(value, str | bool | int | float | np.ndarray):
         return value
     if isinstance(value, np.generic):
         return value.item()
-    if is_dataclass(value) and not isinstance(value, type):
+    if isinstance(value, slice):
+        return [value.start, value.stop, value.step]
+    made = _is_made_of(type(value))
+    if made or (is_dataclass(value) and not isinstance(value, type)):
         if id(value) in known:
             return {"same": known[id(value)]}
+        of = cast(MadeOf, value).made_of() if made else value
         own = {
-            one.name: _stored_whole(getattr(value, one.name), known)
-            for one in fields(value)
+            one.name: _stored_whole(getattr(of, one.name), known)
+            for one in fields(of)
             if one.init and not one.name.startswith("_")
         }
         known[id(value)] = len(known)
-        return {"class": type(value).__name__, "fields": own}
+        return {"class": type(of).__name__, "fields": own}
     if isinstance(value, Mapping):
         return [[_stored_whole(name, known), _stored_whole(one, known)] for name, one in value.items()]
     if isinstance(value, list | tuple | set | frozenset):
@@ -314,7 +364,7 @@ def _stored_whole(value: Any, known: dict[int, int]) -> Any:
     raise InputError(f"a {type(value).__name__} is not stored; compute it anew")
 
 
-def _restored_whole(given: Any, kind: Any, known: list[Any]) -> Any:
+def _restored_whole(given: Any, kind: Any, known: list[tuple[type, Any]]) -> Any:
     """The same as the type says that it is, and as nothing else."""
     origin, parts = get_origin(kind), get_args(kind)
     if origin is Annotated:
@@ -327,9 +377,12 @@ def _restored_whole(given: Any, kind: Any, known: list[Any]) -> Any:
         if given not in parts:
             raise ValueError(f"none of {parts}")
         return given
-    if isinstance(kind, type) and is_dataclass(kind):
+    if isinstance(kind, type) and (is_dataclass(kind) or _is_made_of(kind)):
         return _restored_object(_as_said(given, dict), kind, known)
     of = origin or kind
+    if of is slice:
+        start, stop, step = (one if one is None else _as_said(one, int) for one in _as_said(given, list))
+        return slice(start, stop, step)
     if isinstance(of, type) and issubclass(of, Mapping):
         return {
             _restored_whole(name, parts[0], known): _restored_whole(one, parts[1], known)
@@ -353,18 +406,28 @@ _MANY: dict[Any, Callable[[Any], Any]] = {
 }  # fmt: skip
 
 
-def _restored_object(given: dict[str, Any], kind: type, known: list[Any]) -> Any:
+def _restored_object(given: dict[str, Any], kind: type, known: list[tuple[type, Any]]) -> Any:
+    made = _is_made_of(kind)
+    parts = get_type_hints(kind.made_of)["return"] if made else kind
     if "same" in given:
-        found = known[_as_said(given["same"], int)]
-        return _as_said(found, kind)
-    of = {one.__name__: one for one in _kinds(kind)}[given["class"]]
+        was, found = known[_as_said(given["same"], int)]
+        if not issubclass(was, parts):
+            raise TypeError(f"a {was.__name__} stands where another type is expected")
+        return found
+    of = {one.__name__: one for one in _kinds(parts)}[given["class"]]
     hints, own = get_type_hints(of, include_extras=True), given["fields"]
     wanted = [one.name for one in fields(of) if one.init and not one.name.startswith("_")]
     if set(wanted) != set(own):
         raise ValueError(f"a {of.__name__} has other fields")
     found = of(**{name: _restored_whole(own[name], hints[name], known) for name in wanted})
-    known.append(found)
+    found = found.made() if made else found
+    known.append((of, found))
     return found
+
+
+def _is_made_of(kind: Any) -> bool:
+    """Whether it, a type, is `MadeOf`."""
+    return isinstance(kind, type) and callable(getattr(kind, "made_of", None))
 
 
 def _kinds(kind: type) -> list[type]:
@@ -381,9 +444,10 @@ def _of_several(given: Any, kinds: Sequence[Any]) -> Any:
         plain_type = get_origin(one) or one
         if plain_type is Annotated:
             plain_type = get_origin(get_args(one)[0]) or get_args(one)[0]
-        is_object = isinstance(plain_type, type) and is_dataclass(plain_type)
+        is_object = isinstance(plain_type, type) and (is_dataclass(plain_type) or _is_made_of(plain_type))
         if isinstance(given, dict):
-            if is_object and ("same" in given or given.get("class") in [each.__name__ for each in _kinds(plain_type)]):
+            names = [each.__name__ for each in _kinds(plain_type)] if is_object else []
+            if is_object and ("same" in given or given.get("class") in names or _is_made_of(plain_type)):
                 return one
         elif isinstance(given, list) and not is_object and plain_type not in (str, int, float, bool, np.ndarray):
             return one

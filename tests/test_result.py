@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import threading
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Annotated
@@ -15,7 +16,7 @@ from msgspec import Meta
 from numpy.typing import NDArray
 
 from ema_model.errors import InputError
-from ema_model.result import FLAT, NAME, NULL, Result, as_named, json_type
+from ema_model.result import FLAT, NAME, NULL, Result, as_named, json_type, restored, stored
 from ema_model.text import Document, Lines
 
 
@@ -104,3 +105,89 @@ def test_what_is_told_is_restored_by_the_names_that_files_have():
         with pytest.raises(InputError, match="compute it anew") as error:
             Answer.from_dict(TOLD | wrong)
         assert "\n" not in str(error.value)
+
+
+# --- stored whole -----------------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True, eq=False)
+class Parts:
+    """Of which a machine is made."""
+
+    values: NDArray[np.float64]
+    stretches: Sequence[list[slice] | None] | None
+
+    def made(self) -> Machine:
+        return Machine(self.values, self.stretches)
+
+
+class Machine:
+    """What holds more than can be stored."""
+
+    def __init__(self, values, stretches):
+        self.values, self.stretches, self.handle = values, stretches, threading.Lock()
+
+    def made_of(self) -> Parts:
+        """As it is stored."""
+        return Parts(self.values, self.stretches)
+
+
+@dataclass(frozen=True, eq=False)
+class Step:
+    """One of several that share a machine."""
+
+    machine: Machine
+    before: Step | None = None
+    known: dict[Sure, int] = field(default_factory=dict)
+
+
+def steps():
+    machine = Machine(np.arange(3.0), [[slice(0, 5), slice(7, 9, 2)], None])
+    first = Step(machine, None, {Sure((0.0, math.inf)): 1})
+    return Step(machine, first), first
+
+
+def test_an_object_is_stored_by_its_parts_once_and_made_again():
+    last, first = steps()
+    again = restored(stored(last), Step)
+    assert again.machine is again.before.machine and again.machine is not last.machine
+    assert np.array_equal(again.machine.values, np.arange(3.0))
+    assert again.machine.stretches == [[slice(0, 5), slice(7, 9, 2)], None]
+    assert again.before.known == first.known and again.before.before is None
+    with pytest.raises(InputError, match="a lock is not stored"):
+        stored(Sure((0.0, 1.0), threading.Lock()))
+
+
+@pytest.mark.parametrize(
+    "path",
+    [
+        ("class",),
+        ("fields", "machine"),
+        ("fields", "machine", "class"),
+        ("fields", "machine", "fields", "values"),
+        ("fields", "machine", "fields", "stretches", 0, 0),
+        ("fields", "before", "fields", "machine", "same"),
+        ("fields", "known"),
+    ],
+)
+@pytest.mark.parametrize("bad", ["os.system", 99999, -1, [7], {"class": "Lock", "fields": {}}, None])
+def test_what_is_not_as_its_type_says_is_never_made(path, bad):
+    given = stored(steps()[0])
+    at = given
+    for one in path[:-1]:
+        at = at[one]
+    at[path[-1]] = bad
+    if path == ("fields", "before", "fields", "machine", "same") and bad == -1:
+        return  # counted from the end, it is a machine again, or refused
+    with pytest.raises(InputError, match="was stored by another version, or is damaged") as told:
+        restored(given, Step)
+    assert "\n" not in str(told.value)
+
+
+def test_what_cannot_be_told_of_a_result_is_damaged():
+    answer = Answer({"a": Found(1.0, Sure((0.0, 1.0)))}, (("a", "b"),), np.zeros((1, 2)))
+    assert Answer.restored(answer.stored()).to_dict() == answer.to_dict()
+    given = answer.stored()
+    given["fields"]["by_signal"][0][1]["fields"]["rms"] = "many"
+    with pytest.raises(InputError, match="is damaged"):
+        Answer.restored(given)

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import hashlib
 import importlib.metadata
+import json
 import os
 import secrets
+import shutil
 import subprocess
 import time
 from collections.abc import Iterable, Mapping, Sequence
@@ -15,9 +17,11 @@ from pathlib import Path
 from typing import Annotated, Any, TypedDict
 
 import msgspec
+import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 from msgspec import Meta
+from numpy.typing import NDArray
 
 from ema_model.campaign.kinds import COMMON, HOW, KINDS
 from ema_model.campaign.task import Task, from_json, text_hash
@@ -103,6 +107,16 @@ class Header:
     commit: str = ""
     schema: int = _SCHEMA
     begun: str = field(default_factory=lambda: time.strftime("%Y-%m-%d %H:%M"))
+
+
+@dataclass(frozen=True, eq=False)
+class Packed:
+    """A campaign's folder as a session has it."""
+
+    header: Header
+    plan: str
+    actuators: dict[str, str]  # texts by hash
+    rows: dict[str, NDArray[np.uint8]]  # by kind, as JSON
 
 
 class Store:
@@ -245,6 +259,48 @@ class Store:
             return from_json(row["task"], texts)
         except KeyError as error:
             raise refusal(self.folder / "actuators", f"lacks the actuator {error} of this row") from None
+
+    def packed(self) -> Packed:
+        """All that the folder holds; InputError where it cannot be read."""
+        try:
+            files = sorted((self.folder / "actuators").glob("*.toml"))
+            texts = {path.stem: path.read_text(encoding="utf-8") for path in files}
+        except (OSError, UnicodeDecodeError) as error:
+            raise refusal(self.folder, f"cannot be read ({reason(error)})") from None
+        tables = {kind: self.table(kind, how=True).to_pylist() for kind in sorted(set(self.header.kinds.values()))}
+        rows = {kind: np.frombuffer(json.dumps(one).encode(), np.uint8) for kind, one in tables.items() if one}
+        return Packed(self.header, self.plan, texts, rows)
+
+    @classmethod
+    def unpacked(cls, folder: Path, packed: Packed) -> Store:
+        """The same in a new folder; InputError, and nothing is left of it, for what makes no sense or is not kept."""
+        try:
+            rows = {kind: json.loads(one.tobytes()) for kind, one in packed.rows.items()}
+            hashed = {name: text_hash(text) for name, text in packed.actuators.items()}
+            if not {*rows, *packed.header.kinds.values()} <= {*KINDS} or any(a != b for a, b in hashed.items()):
+                raise InputError("its rows are of no kind, or of other actuators")
+            (folder / "parts").mkdir(parents=True)
+            (folder / "actuators").mkdir()
+            for name, text in packed.actuators.items():
+                _write(folder / "actuators" / f"{name}.toml", text.encode())
+            _write(folder / "plan.toml", packed.plan.encode())
+            _write(folder / "campaign.json", msgspec.json.format(msgspec.json.encode(packed.header)))
+            store = cls(folder)
+            for kind, one in rows.items():
+                store.append(kind, one)
+            store.progress()  # which counts the rows of the groups that the header knows
+        except (AttributeError, InputError, LookupError, OSError, RecursionError, TypeError, ValueError) as error:
+            shutil.rmtree(folder, ignore_errors=True)
+            raise InputError(f"the session's campaign is damaged ({quoted(error, 100)}); save it anew") from None
+        return store
+
+    @property
+    def plan(self) -> str:
+        """The plan's text; InputError where it cannot be read."""
+        try:
+            return (self.folder / "plan.toml").read_text(encoding="utf-8")
+        except (OSError, UnicodeDecodeError) as error:
+            raise refusal(self.folder / "plan.toml", f"cannot be read ({reason(error)})") from None
 
     def _parts(self, kind: str) -> list[Path]:
         return sorted((self.folder / "parts").glob(f"{kind}-*.parquet"))

@@ -9,7 +9,7 @@ from ema_model.actuator import Actuator, load_actuator
 from ema_model.comparison.explain import Explanation
 from ema_model.comparison.result import Comparison
 from ema_model.discovery.begin import begun
-from ema_model.discovery.history import Story, refreshed
+from ema_model.discovery.history import ShownFit, Story, refreshed
 from ema_model.discovery.inverse import other_loop, support_of
 from ema_model.discovery.next_experiment import next_experiment
 from ema_model.discovery.observed.repeated import repeated
@@ -90,8 +90,8 @@ def result_of(
     interrupted: bool = False,
 ) -> Discovery:
     """What a story comes to; unknown: what its last model leaves; interrupted: before its end."""
-    calibration = with_intervals(story.data, story.current)
-    events = left_by(story.data, story.without_curve).events
+    seen = _shown(story)
+    calibration, events = seen.calibration, seen.events
     names = story.named
     added = [
         replace(refreshed(one, calibration), supported_by=support_of(story, one.name), **errors_of(story.ladder, one))
@@ -139,8 +139,25 @@ def result_of(
         repeated=repeated(story.data, story.held, calibration.actuator),
         events=events,
         freed=freed,
-        simulation=free_simulation(story.data, story.held, story.current),
+        simulation=seen.simulation,
     )
+
+
+def _shown(story: Story) -> ShownFit:
+    """What is computed of the last model to be shown, once in the same floors."""
+    found = story.current
+    known = story.shown.get(found)
+    if known is None or known.data is not story.data or known.held is not story.held:
+        data, held = story.data, story.held
+        simulation = known.simulation if known is not None and known.is_of(data, held) else None
+        known = story.shown[found] = ShownFit(
+            data,
+            held,
+            with_intervals(data, found),
+            left_by(data, story.without_curve).events,
+            free_simulation(data, held, found) if simulation is None else simulation,
+        )
+    return known
 
 
 def _as_named(candidates: Sequence[Candidate], named: Sequence[Added]) -> list[Candidate]:

@@ -11,7 +11,9 @@ from itertools import takewhile
 
 from ema_model.actuator.file import cannot_represent
 from ema_model.comparison.explain import Explanation
+from ema_model.comparison.free_simulation import Simulated
 from ema_model.comparison.loop_lag import LoopLag
+from ema_model.comparison.regions import Event
 from ema_model.discovery.criteria import FAR, HALF, NAMED
 from ema_model.discovery.curve import curve_trial
 from ema_model.discovery.fingerprints import Fingerprint, fingerprints, may_act, of_the_file
@@ -97,6 +99,23 @@ def refreshed(one: Added, calibration: Calibration) -> Added:
     return replace(one, parameters=fitted, chosen=chosen)
 
 
+@dataclass(frozen=True, eq=False)
+class ShownFit:
+    """What is computed of a fit to be shown alone: a step back shows it again at once."""
+
+    data: Data  # in whose floors
+    held: Data | None
+    calibration: Calibration  # with intervals
+    events: Sequence[Event]
+    simulation: Mapping[str, Simulated]
+
+    def is_of(self, data: Data, held: Data | None) -> bool:
+        """Whether it is of these recordings, whatever the floors."""
+        return self.data.has_recordings_of(data) and (
+            held is self.held or (held is not None and held.has_recordings_of(self.held))
+        )
+
+
 @dataclass
 class Story:
     """The steps so far, and the recordings that they are judged by."""
@@ -115,7 +134,8 @@ class Story:
     two_masses_seen: TwoMasses | None = None  # where a second mass swings on the motor's and no model holds it
     disagreements: list[Contradiction] = field(default_factory=list)  # of held-out recordings
     turned: list[Contradiction] = field(default_factory=list)  # the same of those whose encoder was put right
-    _calm: dict[Fit, Fit] = field(default_factory=dict)  # fits by those that they were settled from
+    calm: dict[Fit, Fit] = field(default_factory=dict)  # fits by those that they were settled from
+    shown: dict[Fit, ShownFit] = field(default_factory=dict)
 
     @property
     def base(self) -> Fit:
@@ -298,12 +318,27 @@ class Story:
 
     def settled(self, found: Fit, tell: Progress = lambda text: None) -> Fit:
         """A fit made anew as what it leaves asks for; itself where it is at the floor, or is so already."""
-        if found in self._calm.values() or at_floor(self.data, found):
+        if found in self.calm.values() or at_floor(self.data, found):
             return found
-        if found not in self._calm:
+        if found not in self.calm:
             tell("calibrating with the residual as the noise")
-            self._calm[found] = settled(self.data, found, tell)
-        return self._calm[found]
+            self.calm[found] = settled(self.data, found, tell)
+        return self.calm[found]
+
+    def to_store(self) -> Story:
+        """The same with no more than its steps need: what they were settled from is told apart no more."""
+        fits = {step.fit for step in self.steps}
+        return replace(
+            self,
+            steps=[replace(step, settled_from=None) for step in self.steps],
+            calm={one: one for one in [*self.calm.values()] if one in fits},
+            shown={found: one for found, one in [*self.shown.items()] if found in fits},
+        )
+
+    @property
+    def undo_is_at_once(self) -> bool:
+        """Whether nothing is simulated by it: with other faults, errors are told in other floors."""
+        return len(self.steps) < 2 or self.steps[-2].fit.faults == self.current.faults
 
     def undo(self) -> bool:
         """Takes the last step back; False where there is none."""
@@ -330,7 +365,7 @@ class Story:
         """Goes on as another story of the same recordings, by another model; its warnings come last."""
         self.data, self.held, self.steps = other.data, other.held, other.steps
         self.turned = other.turned
-        self.ties, self._calm = other.ties, other._calm
+        self.ties, self.calm, self.shown = other.ties, other.calm, other.shown
         self.refused = {**self.refused, **other.refused}
         self.warnings += other.warnings
 

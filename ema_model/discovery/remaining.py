@@ -25,9 +25,27 @@ from ema_model.comparison.regions import Event, events
 from ema_model.comparison.residuals import Residuals, residuals_of
 from ema_model.comparison.verdict import ORDER_OF_PRIMARY, lasting, most_of_floor
 from ema_model.estimation.floor import as_it_is, silent
-from ema_model.estimation.model_fit import Data, Fit, floor_ratio, twins_of
+from ema_model.estimation.model_fit import Data, Fit, floor_ratio
 
 Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class LeftParts:
+    """What stands for `Left` where it is stored: with what was asked for."""
+
+    data: Data
+    found: Fit
+    explained: list[Explanation] | None
+    orders: list[float] | None
+    events: list[Event] | None
+
+    def made(self) -> Left:
+        """With what is known of it."""
+        made = Left(self.data, self.found)
+        known = {"explained": self.explained, "orders": self.orders, "events": self.events}
+        vars(made).update({name: one for name, one in known.items() if one is not None})  # as cached properties do
+        return made
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,6 +54,11 @@ class Left:
 
     data: Data
     found: Fit
+
+    def made_of(self) -> LeftParts:
+        """As `ema_model.result` stores it."""
+        known = vars(self)
+        return LeftParts(self.data, self.found, known.get("explained"), known.get("orders"), known.get("events"))
 
     @cached_property
     def explained(self) -> list[Explanation]:
@@ -108,7 +131,7 @@ def left_by(data: Data, found: Fit) -> Left:
 @lru_cache(maxsize=4)  # of a fit and of the one before it
 def residuals_left(data: Data, found: Fit) -> Residuals:
     """The residuals of a fit beside the variables that may explain them."""
-    return _residuals(data, found, [as_it_is(draws) for draws in twins_of(found)])
+    return _residuals(data, found, [as_it_is(draws) for draws in found.twins])
 
 
 def _residuals(data: Data, found: Fit, known: Sequence[dict[str, Array]]) -> Residuals:

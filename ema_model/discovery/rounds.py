@@ -112,6 +112,11 @@ class Rounds:
             self._last = found, held, Round(found, noise, before, self._hidden, best)
         return self._last[2]
 
+    def begin(self, story: Story) -> None:
+        """Beside a story's first model, as a search does: beside a later one, what it holds is no candidate."""
+        if not self._made and len(story.steps) > 1:
+            self.beside(Story(story.data, story.held, story.steps[:1]))
+
     def elsewhere(self) -> Rounds:
         """Rounds of another story of the same recordings, which begin with what these know."""
         other = Rounds(self._names)

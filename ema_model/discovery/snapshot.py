@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,6 +27,7 @@ from ema_model.faults import BY_NAME, causes
 from ema_model.quantities.numbers import HALF_90
 
 Array = NDArray[np.float64]
+Known = TypeVar("Known")
 
 _VARIABLES = {"t": "time", "theta": "motor_angle", "omega": "motor_speed", "q": "current", "user": "user_position"}
 _USUAL_NM = 1e-3  # at a motor's shaft, where it cannot be said how much is left
@@ -42,13 +44,9 @@ class Assessment:
     candidates: Sequence[Candidate]
     signatures: Mapping[str, Array]  # (values,) over the floor
     alike: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
-    refits: Refits | None = None  # of the most probable, once they are all known
-    refitted: Mapping[str, float] = field(default_factory=dict)  # the error with those that are refitted, in floors
-
-    @property
-    def spoken_against(self) -> Mapping[str, str]:
-        """Why what is so probable would not be named, by the candidate's name; once it is refitted."""
-        return self.refits.spoken_against if self.refits is not None else {}
+    is_refined: bool = False  # whether the most probable are all refitted
+    refitted: Mapping[str, float] = field(default_factory=dict)  # the error with those that are, in floors
+    spoken_against: Mapping[str, str] = field(default_factory=dict)  # why what is so probable would not be named
 
     def probability(self, name: str) -> float:
         """That a candidate is missing, or what looks like it: by algebra, or by its refit once that is known."""
@@ -176,8 +174,8 @@ def refined(
     rounds: Rounds,
     tell: Callable[[str], None],
     shown: Callable[[Assessment], None],
-) -> Assessment:
-    """What the last model of a story leaves, once the most probable candidates are refitted.
+) -> tuple[Assessment, Refits]:
+    """What the last model of a story leaves, once the most probable candidates are refitted; and these refits.
 
     shown is given it as it stands after each few of them; tell may raise to stop.
     """
@@ -189,7 +187,7 @@ def refined(
         return replace(seen, candidates=found.candidates, refitted=errors)
 
     found = refits_beside(story, rounds, tell, lambda so_far: shown(with_refits(so_far)))
-    return replace(with_refits(found), refits=found)
+    return replace(with_refits(found), is_refined=True, spoken_against=found.spoken_against), found
 
 
 def _alike(signatures: Mapping[str, Array]) -> dict[str, tuple[str, ...]]:
@@ -208,7 +206,7 @@ def _same(one: Array, other: Array) -> bool:
     return bool(apart < _SAME_DIRECTION or max(first, second) * apart < _SAME_CHI2)
 
 
-def known_of(step: Step, known: Mapping[Step, Assessment]) -> Assessment | None:
+def known_of(step: Step, known: Mapping[Step, Known]) -> Known | None:
     """What is known of a step, or of the one that it was settled from."""
     at: Step | None = step
     while at is not None and at not in known:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Collection, Container, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from functools import cached_property, lru_cache
 
 import numpy as np
@@ -84,6 +84,11 @@ class Data:
             np.multiply(signal, weights, out=told[..., first:last])
         return told
 
+    def has_recordings_of(self, other: Data | None) -> bool:
+        """Whether they are the same, whatever the floors."""
+        mine, its = self.measurements, [] if other is None else other.measurements
+        return len(mine) == len(its) and all(one is another for one, another in zip(mine, its))
+
     def weighs_as(self, other: Data) -> bool:
         """Whether floors of the same windows hardly differ, so that a fit to one is a fit to the other."""
         return all(
@@ -100,6 +105,26 @@ class Data:
 
 
 @dataclass(frozen=True, eq=False)
+class FitParts:
+    """What stands for a fit where it is stored: with its twins, if they were simulated."""
+
+    actuator: Actuator
+    plant: Model
+    calibration: Calibration
+    starts: dict[str, float]
+    faults: tuple[str, ...]
+    held: tuple[str, ...]
+    twins: Sequence[Signals] | None
+
+    def made(self) -> Fit:
+        """The fit."""
+        made = Fit(self.actuator, self.plant, self.calibration, self.starts, self.faults, self.held)
+        if self.twins is not None:
+            vars(made)["twins"] = self.twins  # as the cached property does
+        return made
+
+
+@dataclass(frozen=True, eq=False)
 class Fit:
     """A calibrated model."""
 
@@ -109,6 +134,17 @@ class Fit:
     starts: dict[str, float]  # x by name
     faults: tuple[str, ...] = ()  # k1 … k8 that move beside the parameters
     held: tuple[str, ...] = ()  # parameters that stay as the file says, though it leaves them free
+
+    def made_of(self) -> FitParts:
+        """As `ema_model.result` stores it."""
+        own = {one.name: getattr(self, one.name) for one in fields(self)}
+        return FitParts(**own, twins=vars(self).get("twins"))
+
+    @cached_property
+    def twins(self) -> Sequence[Signals]:
+        """As of `twin_error`, by window."""
+        fitted, k = self.calibration.actuator, self.calibration.k
+        return [twin_error(self.plant, place, fitted, k) for place in range(len(self.plant.windows))]
 
     @property
     def residual(self) -> Array:
@@ -142,16 +178,9 @@ def gather(
     return Data(measurements, stretches, floors, signals)
 
 
-@lru_cache(maxsize=4)
-def twins_of(found: Fit) -> Sequence[Signals]:
-    """As of `twin_error`, by window, of a fit."""
-    fitted, k = found.calibration.actuator, found.calibration.k
-    return [twin_error(found.plant, place, fitted, k) for place in range(len(found.plant.windows))]
-
-
 def in_floors_of(found: Fit, data: Data, held: Data | None) -> tuple[Data, Data | None]:
     """Data, and held-out ones, whose errors are told in what a true model leaves that was fitted as this one."""
-    calibration, twins = found.calibration, twins_of(found)
+    calibration, twins = found.calibration, found.twins
     taken = taken_up(data.floors, calibration, twins)
     data = replace(data, after_fit=after_fit(data.floors, calibration, twins, taken))
     if held is None:

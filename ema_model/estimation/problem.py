@@ -272,7 +272,7 @@ class Problem:
         self.base = np.array([u.is_base for u in unknowns], dtype=bool)
         self.prior = np.ones(self.count)  # 1 over its σ, which is less than 1 for what is believed to be close
         self._step = np.array([u.step for u in unknowns])
-        self._k = np.asarray(model.actuator.k if k is None else k, dtype=float)
+        self.fixed_k = np.asarray(model.actuator.k if k is None else k, dtype=float)
         self._nominal, self._sigma = (np.array([getattr(u, one) for u in unknowns]) for one in ("nominal", "sigma"))
         self._scale = np.array([u.is_scale for u in unknowns], dtype=bool)
         self._faults = [(i, u.place) for i, u in enumerate(unknowns) if u.kind == "fault"]
@@ -285,19 +285,16 @@ class Problem:
             )
             for places in map(self._places, range(len(model.windows)))
         ]
-        self._asked = signals or dict.fromkeys(SIGNALS, 1.0)
+        self.asked = signals or dict.fromkeys(SIGNALS, 1.0)
         self.reweighted(floors)
         if not self.values:
-            raise InputError(f"none of the recordings has a signal of {', '.join(self._asked)}")
+            raise InputError(f"none of the recordings has a signal of {', '.join(self.asked)}")
 
     def reweighted(self, floors: Sequence[Floor], added: Sequence[Mapping[str, Array]] = ()) -> None:
         """Sets other floors, and what the model is known to lack, by window and signal, (blocks,), which is added."""
         self.floors, self.added = list(floors), list(added)
         self.weights = [
-            {
-                name: weight / one.fit_sigma(name)
-                for name, weight in fitted_signals(self._asked, window.measured).items()
-            }
+            {name: weight / one.fit_sigma(name) for name, weight in fitted_signals(self.asked, window.measured).items()}
             for window, one in zip(self.model.windows, self.floors)
         ]
         self.values = sum(len(values) for weights in self.weights for values in weights.values())
@@ -448,14 +445,14 @@ class Problem:
 
     def vector(self, x: Array) -> Array:
         """The faults at x (…, unknowns), the eccentricity as a vector: (…, 8)."""
-        vector = np.tile(to_vector(self._k), (*x.shape[:-1], 1))
+        vector = np.tile(to_vector(self.fixed_k), (*x.shape[:-1], 1))
         for column, place in self._faults:
             vector[..., place] = self._nominal[column] + self._sigma[column] * x[..., column]
         return vector
 
     def k(self, x: Array) -> Array:
         """The faults at x (…, unknowns): (…, 8)."""
-        return to_k(self.vector(x)) if self._faults else np.tile(self._k, (*x.shape[:-1], 1))
+        return to_k(self.vector(x)) if self._faults else np.tile(self.fixed_k, (*x.shape[:-1], 1))
 
     def at(self, k: ArrayLike) -> Array:
         """x (…, unknowns) of faults (…, 8), all else as it is known: the inverse of `k`."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -25,7 +26,7 @@ from ema_model.estimation.problem import (
     unknowns_of,
 )
 from ema_model.faults import HEALTHY, NAMES
-from ema_model.models import ClosedLoop
+from ema_model.models import ClosedLoop, Model
 from ema_model.models.closed_loop import LOAD
 
 # --- how far each base parameter of an actuator is from its file's value, as recordings say ---------------------------
@@ -413,6 +414,38 @@ def _with_twins(
     return best, kept, evaluations
 
 
+@dataclass(frozen=True, eq=False)
+class ErrorParts:
+    """Of which a corrected error is made: where an answer is stored, they stand for it."""
+
+    model: Model
+    floors: Sequence[Floor]
+    unknowns: Sequence[Unknown]
+    signals: Mapping[str, float]
+    faults: Array  # (8,), as the problem has those that do not move
+    prior: Array
+    added: Sequence[Mapping[str, Array]]
+    x: Array
+    least: float
+
+    @classmethod
+    def of(cls, problem: Problem, x: Array, least: float) -> ErrorParts:
+        """Of a fit that ended at x."""
+        own = problem.unknowns, problem.asked, problem.fixed_k, problem.prior, problem.added
+        return cls(problem.model, problem.floors, *own, x, least)
+
+    def made(self) -> CorrectedError:
+        """The error, of which nothing is computed before it is asked for."""
+        return CorrectedError(self)
+
+    def problem(self) -> Problem:
+        """The fit's."""
+        made = Problem(self.model, self.floors, self.unknowns, self.signals, self.faults)
+        made.prior = self.prior
+        made.reweighted(self.floors, self.added)
+        return made
+
+
 class CorrectedError:
     """Rms of measured less model current with the model's own bias added, A: faults k (n, 8) → (n,).
 
@@ -420,21 +453,40 @@ class CorrectedError:
     the model diverges.  What the plain rmse counts against an answer of the simplified model, this leaves out.
     """
 
-    def __init__(self, found: Fitted) -> None:
-        self._found = found
-        problem = found.problem
-        self._parts = [
+    def __init__(self, parts: ErrorParts) -> None:
+        self._x, self._given, self.least = parts.x, parts, parts.least  # at the fit itself
+
+    @classmethod
+    def of_fit(cls, found: Fitted) -> CorrectedError:
+        """As a fit has it."""
+        made = cls(ErrorParts.of(found.problem, found.x, math.nan))
+        vars(made)["_problem"] = found.problem  # as the cached property does
+        made.least = float(made._of(found.residual[None, :])[0])
+        return made
+
+    def made_of(self) -> ErrorParts:
+        """As `ema_model.result` stores it."""
+        return ErrorParts.of(self._problem, self._x, self.least) if "_problem" in vars(self) else self._given
+
+    @cached_property
+    def _problem(self) -> Problem:
+        return self._given.problem()
+
+    @cached_property
+    def _parts(self) -> list[tuple[slice, Array]]:
+        """Of the current: where its rows stand, and one over their σ."""
+        problem = self._problem
+        return [
             (rows, problem.over_sigma(i, name, np.ones(rows.stop - rows.start)))
             for i, name, rows in problem.parts()
             if name == CURRENT
         ]
-        self.least = float(self._of(found.residual[None, :])[0])  # at the fit itself
 
     def __call__(self, k: ArrayLike) -> Array:
         """k (n, 8) → (n,), A."""
-        problem = self._found.problem
+        problem = self._problem
         k = np.atleast_2d(np.asarray(k, dtype=float))
-        x = np.tile(self._found.x, (len(k), 1))
+        x = np.tile(self._x, (len(k), 1))
         x[:, :FAULTS] = problem.at(k)[:, :FAULTS]
         few = [self._of(problem.residuals(x[first : first + TOGETHER])) for first in range(0, len(x), TOGETHER)]
         return np.concatenate(few)

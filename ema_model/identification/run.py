@@ -281,7 +281,7 @@ def steps(
         parameters=found.problem.parameters(found.x) if polishes else {},
         objective=objective,
     )
-    return answer.corrected_by(CorrectedError(found))
+    return answer.corrected_by(CorrectedError.of_fit(found))
 
 
 def _optimise(objective: Objective, optimiser: Optimiser) -> Generator[Progress, None, None]:

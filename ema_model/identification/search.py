@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Generator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any, Self
 
 import numpy as np
@@ -30,6 +31,22 @@ from ema_model.stacks import exclusive
 Array = NDArray[np.float64]
 
 
+@dataclass(frozen=True, eq=False)
+class ObjectiveParts:
+    """Of which an objective is made: where a result is stored, they stand for it."""
+
+    measurements: Sequence[Measurement]
+    actuator: Actuator
+    effects: Mapping[str, Mapping[str, float]]
+    circuit: str
+    fitness: str
+
+    def made(self) -> Objective:
+        """The objective, of which nothing is computed before it is asked for."""
+        of: dict[str, Any] = {"effects": self.effects, "circuit": self.circuit, "fitness": self.fitness}
+        return Objective(self.measurements, self.actuator, **of, at_once=False)
+
+
 class Objective(ClosedLoop):
     """Root-mean-square error of I_3eq, A, for a population of k, over one recording or several.
 
@@ -46,7 +63,9 @@ class Objective(ClosedLoop):
         effects: Mapping[str, Mapping[str, float]] | None = None,
         circuit: str = "reduced",
         fitness: str = "filtered",
+        at_once: bool = True,
     ) -> None:
+        """at_once: as of `ClosedLoop`."""
         if fitness not in FITNESSES:
             raise InputError(f"no fitness {quoted(fitness)!r}; fitnesses are {', '.join(FITNESSES)}")
         super().__init__(
@@ -56,13 +75,29 @@ class Objective(ClosedLoop):
             circuit=circuit,
             own_kernels=True,
             block_s=BLOCK_S if fitness == "filtered" else 0.0,
+            at_once=at_once,
         )
-        for measurement in self.measurements:
+        for measurement in self.recorded:
             measurement.require("current_A")
         self.fitness = fitness
-        self.target = np.concatenate([self._target(window) for window in self.windows])
-        self.blocks = len(self.target)
-        self._groups = self._grouped()
+
+    def made_of(self) -> ObjectiveParts:
+        """As in `Model`."""
+        return ObjectiveParts(self.recorded, self.actuator, self.effects, self._circuit, self.fitness)
+
+    @cached_property
+    def target(self) -> Array:
+        """What is fitted, A, (blocks,), the recordings one after another."""
+        return np.concatenate([self._target(window) for window in self.windows])
+
+    @property
+    def blocks(self) -> int:
+        """Number of fitted values."""
+        return len(self.target)
+
+    @cached_property
+    def _groups(self) -> list[_Group]:
+        return self._grouped()
 
     def at_longer_steps(self, most_s: float) -> Self:
         """As in `Model`."""

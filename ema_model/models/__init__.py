@@ -20,6 +20,11 @@ def model_for(
     stretches: Sequence[list[slice] | None] | None = None,
 ) -> Model:
     """The closed loop where the controller is known; inverse dynamics where it is not, and for static maps."""
-    if actuator.controller.kind == "unknown" or any(m.is_map for m in measurements):
+    if is_inverse(measurements, actuator):
         return InverseDynamics(measurements, actuator, effects=effects, stretches=stretches)
     return ClosedLoop(measurements, actuator, effects=effects, stretches=stretches)
+
+
+def is_inverse(measurements: Sequence[Measurement], actuator: Actuator) -> bool:
+    """Whether the motion is put in."""
+    return actuator.controller.kind == "unknown" or any(m.is_map for m in measurements)

@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from copy import copy
 from dataclasses import replace
+from functools import cached_property
 from typing import Any, Self
 
 import numpy as np
@@ -21,7 +22,7 @@ from ema_model.effects import find
 from ema_model.errors import InputError
 from ema_model.models.loop_window import BLOCK_S, COMPARED, LoopWindow, cut
 from ema_model.models.measured_motion import check_steps, later, on_even_grid
-from ema_model.models.model import Effects, Signals
+from ema_model.models.model import Effects, ModelParts, Signals
 from ema_model.physics.rows import LANES
 from ema_model.recordings import Measurement
 from ema_model.recordings.noise import least_noise, sample_noise
@@ -29,6 +30,7 @@ from ema_model.simulation.compiled import own_stack, stack_at_hand
 from ema_model.simulation.pack import initial_state, monitor_rows
 from ema_model.simulation.plant import simulate_references
 from ema_model.simulation.run import Run, reference_steps, traced
+from ema_model.stacks import Stack
 
 Array = NDArray[np.float64]
 
@@ -52,8 +54,12 @@ class ClosedLoop:
         own_kernels: bool = False,
         block_s: float = BLOCK_S,
         stretches: Sequence[list[slice] | None] | None = None,
+        at_once: bool = True,
     ) -> None:
-        """own_kernels: whether they are worth waiting for, instead of the library's in the meantime."""
+        """own_kernels: whether they are worth waiting for, instead of the library's in the meantime.
+
+        at_once: whether what is wrong with recordings is said now; else once the windows are asked for.
+        """
         if not measurements:
             raise InputError("one recording or more is needed")
         self.actuator = actuator
@@ -61,19 +67,44 @@ class ClosedLoop:
         self.effects = {
             name: find(name, actuator.axes).settings(dict(given)) for name, given in (effects or {}).items()
         }
-        self.stack = (
-            own_stack(actuator, self.effects, circuit)
-            if own_kernels
-            else stack_at_hand(actuator, self.effects, circuit, "traces")
-        )
         self.recorded = list(measurements)  # before they were put on an even grid
-        self.measurements = [on_even_grid(m) for m in measurements]
-        chosen = stretches or [None] * len(self.measurements)
-        check_steps(self.measurements, chosen, actuator)
-        self.windows = [
+        self._circuit, self._own_kernels, self._block_s, self._stretches = circuit, own_kernels, block_s, stretches
+        if at_once:
+            _ = self.stack, self.windows
+
+    def made_of(self) -> ModelParts:
+        """As in `Model`."""
+        return ModelParts(
+            self.recorded,
+            self.actuator,
+            self.effects,
+            self._stretches,
+            self._circuit,
+            self._block_s,
+            self._own_kernels,
+        )
+
+    @cached_property
+    def stack(self) -> Stack:
+        """As in `Model`."""
+        if self._own_kernels:
+            return own_stack(self.actuator, self.effects, self._circuit)
+        return stack_at_hand(self.actuator, self.effects, self._circuit, "traces")
+
+    @cached_property
+    def measurements(self) -> list[Measurement]:
+        """As in `Model`."""
+        return [on_even_grid(m) for m in self.recorded]
+
+    @cached_property
+    def windows(self) -> list[LoopWindow]:
+        """As in `Model`."""
+        chosen = self._stretches or [None] * len(self.measurements)
+        check_steps(self.measurements, chosen, self.actuator)
+        return [
             window
             for i, (m, parts) in enumerate(zip(self.measurements, chosen))
-            for window in cut(m, actuator, recording=i, block_s=block_s, stretches=parts)
+            for window in cut(m, self.actuator, recording=i, block_s=self._block_s, stretches=parts)
         ]
 
     def at_longer_steps(self, most_s: float) -> Self:

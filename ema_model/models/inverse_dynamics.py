@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -17,13 +18,14 @@ from ema_model.actuator import Actuator
 from ema_model.effects import find
 from ema_model.errors import InputError
 from ema_model.models.measured_motion import Stretch, later, on_even_grid, stretches_of
-from ema_model.models.model import Effects, Signals
+from ema_model.models.model import Effects, ModelParts, Signals
 from ema_model.physics.rows import LANES
 from ema_model.recordings import Measurement
 from ema_model.recordings.noise import least_noise
 from ema_model.simulation.compiled import stack_at_hand
 from ema_model.simulation.pack import monitor_rows
 from ema_model.simulation.run import needed_currents
+from ema_model.stacks import Stack
 
 Array = NDArray[np.float64]
 
@@ -46,21 +48,42 @@ class InverseDynamics:
         *,
         effects: Mapping[str, Mapping[str, float]] | None = None,
         stretches: Sequence[list[slice] | None] | None = None,
+        at_once: bool = True,
     ) -> None:
+        """at_once: as of `ClosedLoop`."""
         if not measurements:
             raise InputError("one recording or more is needed")
         self.actuator = actuator
         self.effects = {
             name: find(name, actuator.axes).settings(dict(given)) for name, given in (effects or {}).items()
         }
-        self.stack = stack_at_hand(actuator, self.effects, "reduced", "currents")
         self.recorded = list(measurements)  # before they were put on an even grid
-        self.measurements = [m if m.is_map else on_even_grid(m) for m in measurements]
-        chosen = stretches or [None] * len(self.measurements)
-        self.windows = [
+        self._stretches = stretches
+        if at_once:
+            _ = self.stack, self.windows
+
+    def made_of(self) -> ModelParts:
+        """As in `Model`."""
+        return ModelParts(self.recorded, self.actuator, self.effects, self._stretches, "reduced", 0.0)
+
+    @cached_property
+    def stack(self) -> Stack:
+        """As in `Model`."""
+        return stack_at_hand(self.actuator, self.effects, "reduced", "currents")
+
+    @cached_property
+    def measurements(self) -> list[Measurement]:
+        """As in `Model`."""
+        return [m if m.is_map else on_even_grid(m) for m in self.recorded]
+
+    @cached_property
+    def windows(self) -> list[Stretch]:
+        """As in `Model`."""
+        chosen = self._stretches or [None] * len(self.measurements)
+        return [
             stretch
             for i, (m, parts) in enumerate(zip(self.measurements, chosen))
-            for stretch in stretches_of(self.recorded[i], m, actuator, recording=i, parts=parts)
+            for stretch in stretches_of(self.recorded[i], m, self.actuator, recording=i, parts=parts)
         ]
 
     def signals(

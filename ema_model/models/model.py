@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Any, Protocol
 
 import numpy as np
@@ -49,16 +50,51 @@ class Window:
         return len(self.time_s)
 
 
+@dataclass(frozen=True, eq=False)
+class ModelParts:
+    """Of which a model is made: where a result is stored, they stand for it."""
+
+    measurements: Sequence[Measurement]
+    actuator: Actuator
+    effects: Mapping[str, Mapping[str, float]]
+    stretches: Sequence[list[slice] | None] | None
+    circuit: str
+    block_s: float
+    own_kernels: bool = False
+
+    def made(self) -> Model:
+        """The model; its windows are cut, and its kernels found, once they are asked for."""
+        from ema_model.models import ClosedLoop, InverseDynamics, is_inverse  # which are made of this module
+
+        given: dict[str, Any] = {"effects": self.effects, "stretches": self.stretches, "at_once": False}
+        if is_inverse(self.measurements, self.actuator):
+            return InverseDynamics(self.measurements, self.actuator, **given)
+        given |= {"circuit": self.circuit, "block_s": self.block_s, "own_kernels": self.own_kernels}
+        return ClosedLoop(self.measurements, self.actuator, **given)
+
+
 class Model(Protocol):
     """An actuator's model beside recordings; windows are named by their place in `windows`."""
 
     actuator: Actuator
     effects: dict[str, dict[str, float]]  # besides the actuator's own
-    stack: Stack  # the kernels
     recorded: list[Measurement]
-    measurements: list[Measurement]  # the same on an even grid
 
-    @property
+    def made_of(self) -> ModelParts:
+        """As `ema_model.result` stores it."""
+        ...
+
+    @cached_property
+    def stack(self) -> Stack:
+        """The kernels."""
+        ...
+
+    @cached_property
+    def measurements(self) -> list[Measurement]:
+        """The recordings on an even grid."""
+        ...
+
+    @cached_property
     def windows(self) -> Sequence[Window]:
         """What is compared."""
         ...

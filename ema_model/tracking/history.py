@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from copy import copy
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from ema_model import faults
+from ema_model.errors import InputError
 from ema_model.tracking.evidence import LEAST_FLIGHTS
 from ema_model.tracking.flights import Flight
 from ema_model.tracking.result import Tracked
@@ -21,6 +22,25 @@ class Came:
     seen: int  # flights since
 
 
+@dataclass(frozen=True, eq=False)
+class HistoryParts:
+    """Of which a history is made: where it is stored, they stand for it."""
+
+    thresholds: dict[str, float]
+    seed: int
+    flights: list[Flight]
+    looks: dict[int, Tracked]  # without their flights, which are the first of these
+
+    def made(self) -> History:
+        """The history; InputError for looks that are not of its flights."""
+        made = History(self.thresholds, self.seed)
+        if not {*self.looks} <= {*range(1, len(self.flights) + 1)}:
+            raise InputError("a history's looks are not of its flights")
+        made.flights, made._tracker = self.flights, None
+        made.looks = {count: replace(one, flights=tuple(self.flights[:count])) for count, one in self.looks.items()}
+        return made
+
+
 class History:
     """The looks of a `Tracker`, flight after flight; flights that arrive at the end cost their own looks alone."""
 
@@ -29,7 +49,12 @@ class History:
         self.thresholds, self._seed = dict(thresholds or {}), seed
         self.looks: dict[int, Tracked] = {}  # by how many flights there were
         self.flights: list[Flight] = []  # in order of time
-        self._tracker = Tracker(self.thresholds, seed)
+        self._tracker: Tracker | None = Tracker(self.thresholds, seed)
+
+    def made_of(self) -> HistoryParts:
+        """As `ema_model.result` stores it."""
+        bare = {count: replace(one, flights=()) for count, one in self.looks.items()}
+        return HistoryParts(self.thresholds, self._seed, self.flights, bare)
 
     def follow(self, flights: Sequence[Flight]) -> Iterator[int]:
         """Looks after each flight, all in order of time; yields how many are done.
@@ -38,6 +63,10 @@ class History:
         """
         if [*map(id, self.flights)] != [*map(id, flights[: len(self.flights)])]:
             self.looks, self.flights, self._tracker = {}, [], Tracker(self.thresholds, self._seed)
+        if self._tracker is None:  # it was stored
+            self._tracker = Tracker(self.thresholds, self._seed)
+            for one in self.flights:
+                self._tracker.add(one)
         usable = sum(not one.excluded for one in self.flights)
         for one in flights[len(self.flights) :]:
             self._tracker.add(one)

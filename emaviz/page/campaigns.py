@@ -104,6 +104,18 @@ class CampaignControls:
         self._page.workspaces.bring_forward(self._at.name, "", _TAB)
         self._post(self._show)
 
+    def saved(self) -> dict[str, Any] | None:
+        """The campaign that is shown, for a session's file."""
+        return self._campaigns.saved(str(self._choice.value))
+
+    def restore(self, saved: Any) -> None:
+        """Takes a session's, and shows it; what is wrong with it stands below the list."""
+        if saved is not None:
+            try:
+                self.choose(self._campaigns.restore(saved))
+            except InputError as error:
+                self._say(str(error))
+
     # --- on the files' thread ---------------------------------------------------------------------------------------
 
     def refresh(self) -> None:
@@ -130,7 +142,7 @@ class CampaignControls:
 
     def _reports(self, name: str) -> Html:
         """A link to what was written of it."""
-        if self._campaigns.report(f"{name}/{REPORT}") is None:
+        if not self._campaigns.has_report(name):
             return Html()
         at = f"{RESULTS}{quote(name)}/{REPORT}"
         return html('<div class="emaviz-report"><a href="{}" target="_blank" rel="noopener">Report ↗</a></div>', at)

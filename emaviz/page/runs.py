@@ -597,6 +597,10 @@ class RunsTab(Tab):
         """Plans that may be computed."""
         self.campaigns.starts.refresh()
 
+    def kept(self) -> dict[str, Part]:
+        """The campaign that is shown."""
+        return {"campaign": Part(self.campaigns.saved, lambda saved, _: self.campaigns.restore(saved))}
+
     def takes(self) -> dict[str, Callable[[Path], None]]:
         """Sessions."""
         return {SESSION_SUFFIX: self.sessions.uploaded}

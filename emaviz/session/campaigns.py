@@ -20,7 +20,7 @@ from ema_model.campaign.plan_axes import TaskInputs, inputs_of
 from ema_model.campaign.result import Campaign
 from ema_model.campaign.run import Status, duration, estimate_s, run_plan
 from ema_model.campaign.schedulers import scheduler
-from ema_model.campaign.store import Store
+from ema_model.campaign.store import Packed, Store
 from ema_model.campaign.task import Task
 from ema_model.comparison import compare
 from ema_model.discovery import discover
@@ -29,16 +29,19 @@ from ema_model.files.opened import shown
 from ema_model.identification.run import Progress, identify
 from ema_model.identification.search import Objective
 from ema_model.recordings import Measurement
+from ema_model.result import Result, restored, stored
 from emaviz.session.data_folder import DataFolder
 from emaviz.session.explore import Session
-from emaviz.session.inputs import Inputs, digest, version_of
+from emaviz.session.inputs import Inputs, Room, digest
 from emaviz.session.jobs import Job, Run, Signal, Steps, Stopped, Tell, elsewhere
+from emaviz.session.settings import taken
 
 _HEADER = "campaign.json"
 _DEPTHS = ("*", "*/*")  # below the data folder
 _OWN, _PLANS = "campaigns", "plans"  # folders of the data folder: of campaigns that begin here, of plans of one's own
 REPORT = "report.html"
 _THESIS = ("thesis_quick", "thesis")  # the plans of which a report and a recording are set beside the thesis
+_MOST_ALIKE = 100  # campaigns of one name
 _NAME = re.compile(r"\w[\w.() +-]{0,60}")
 _LOOK_S = 0.1
 
@@ -57,6 +60,13 @@ class Computing:
         return self.plan in _THESIS
 
 
+class SavedCampaign(msgspec.Struct, frozen=True):
+    """What a session's file says of the campaign that is shown; its folder stands beside."""
+
+    name: str
+    report: bool = False  # whether one was written
+
+
 class Campaigns:
     """The campaigns below the data folder, and those that the command line has named.  InputError as `Store`."""
 
@@ -67,6 +77,7 @@ class Campaigns:
         self.grown: Signal[[str]] = Signal()  # name of a campaign that has begun, or has rows more
         self.written: Signal[[str, list[Path]]] = Signal()  # such a name, and its report, and a recording
         self._recorded: tuple[Path, Measurement, str] | None = None
+        self._said: set[Path] = set()  # folders of which a session says that they had a report
         self._session, self._data = session, data
         self._given = [Store(path).folder for path in given]
 
@@ -82,16 +93,65 @@ class Campaigns:
         return Store(folders[name])
 
     def report(self, name: str) -> Path | None:
-        """A campaign's report, by its campaign's name and its own, or None; of the data folder alone."""
+        """A campaign's report, by its campaign's name and its own, or None; of the data folder alone.
+
+        One that a session said to be there is written now.
+        """
         path = self._data.folder / name
         fits = path.name == REPORT and self._data.holds(path) and (path.parent / _HEADER).is_file()
+        if fits and not path.is_file() and path.parent in self._said:
+            with suppress(InputError):
+                store = Store(path.parent)
+                _result(store, any(store.plan == load_plan(one).text for one in _THESIS)).export(path)
         return path if fits and path.is_file() else None
+
+    def has_report(self, name: str) -> bool:
+        """Whether there is one, or a session said so."""
+        folder = self._folders().get(name)
+        return folder is not None and self._data.holds(folder) and ((folder / REPORT).is_file() or folder in self._said)
 
     def inputs(self, name: str) -> Inputs:
         """What a campaign's tables are made from now."""
         folder = self._folders().get(name)
-        rows = "" if folder is None else " ".join(sorted(version_of(one) for one in folder.rglob("*.parquet")))
+        rows = [] if folder is None else sorted((str(one), _as_it_is(one)) for one in folder.rglob("*.parquet"))
         return Inputs(name, name, options={"the set of its rows": digest(rows)})
+
+    # --- a session --------------------------------------------------------------------------------------------------
+
+    def saved(self, name: str) -> dict[str, Any] | None:
+        """The campaign of that name with its rows, for a session's file; its name alone where there is no room."""
+        if name not in self._folders():
+            return None
+        told: dict[str, Any] = {"name": name, "campaign": None, "report": self.has_report(name)}
+        with suppress(InputError):
+            told["campaign"] = Room().take(stored(self.store(name).packed()))
+        return told
+
+    def restore(self, saved: Any) -> str:
+        """Takes a session's into the data folder, unless it is there; its name.  InputError for what makes no sense."""
+        told: SavedCampaign = taken(SavedCampaign, saved, "campaign")
+        given = saved.get("campaign")
+        if given is None:
+            self.store(told.name)  # which says that it is not here
+            return told.name
+        packed, folders = restored(given, Packed), self._folders()
+        if (known := folders.get(told.name)) is not None and _is_same(Store(known), packed):
+            return told.name
+        stem = Path(told.name).name
+        stem = stem if _NAME.fullmatch(stem) else "campaign"
+        for number in range(1, _MOST_ALIKE):
+            name = f"{_OWN}/{stem}" + (f" ({number})" if number > 1 else "")
+            if (folder := self._data.folder / name).exists():
+                if name in folders and _is_same(Store(folders[name]), packed):
+                    return name
+                continue
+            if not self._data.holds(folder):
+                break
+            Store.unpacked(folder, packed)
+            if told.report:
+                self._said.add(folder)
+            return name
+        raise InputError(f"{shown(stem, 60)}: too many campaigns have this name; remove some")
 
     # --- one that begins --------------------------------------------------------------------------------------------
 
@@ -160,17 +220,14 @@ class Campaigns:
 
     def _write(self, asked: Computing, store: Store) -> list[Path]:
         """The report, in the campaign's folder; beside the thesis also a recording, where the viewer finds it."""
-        path = store.folder / REPORT
+        path, found = store.folder / REPORT, _result(store, asked.reproduces)
+        found.export(path)
         if not asked.reproduces:
-            Campaign(store).export(path)
             return [path]
-        from ema_model.campaign.thesis import Evaluation, drawn
         from emaviz.recording.entry import free_name  # rerun takes a second to import
 
-        found = Evaluation(store, drawn(load_actuator()))
         recording = free_name(self._session.folder, asked.name, ".rrd")
-        for one in (path, recording):
-            found.export(one)
+        found.export(recording)
         return [path, recording]
 
     # --- a row as a run ---------------------------------------------------------------------------------------------
@@ -212,6 +269,29 @@ class Campaigns:
         path, run, said = self._recorded
         self.opened(path, run)
         return said
+
+
+def _result(store: Store, reproduces: bool) -> Result:
+    """Of a campaign's rows: beside the thesis where they are its evaluation's."""
+    if not reproduces:
+        return Campaign(store)
+    from ema_model.campaign.thesis import Evaluation, drawn
+
+    return Evaluation(store, drawn(load_actuator()))
+
+
+def _is_same(one: Store, other: Packed) -> bool:
+    """Whether a folder's campaign is the one of a session, which may have fewer rows."""
+    own = one.packed()
+    return own.header == other.header and own.plan == other.plan and own.rows.keys() >= other.rows.keys()
+
+
+def _as_it_is(path: Path) -> tuple[int, int]:
+    """By which a file of rows is known again: thousands of them are not read for it."""
+    with suppress(OSError):
+        at = path.stat()
+        return at.st_size, at.st_mtime_ns
+    return 0, 0
 
 
 def _computed(plan: Plan, folder: Path, workers: int, run: Run) -> Generator[Status | None, None, None]:

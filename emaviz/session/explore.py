@@ -104,7 +104,8 @@ class Session:
         self.worker = Worker("emaviz-compute", self._on_error)
         self.version_of: Callable[[str], str] = lambda _: ""  # of such a file
         self.identifying = Identifying(self.worker, actuator, folder, self.events.told, self.inputs)
-        self.identifying.identified.connect(lambda _: self._show_identified())
+        for signal in (self.identifying.identified, self.identifying.brought):
+            signal.connect(lambda _: self._show_identified())
 
     def start(self) -> None:
         """Compiles what the page needs, visibly, and shows the first picture."""

@@ -9,14 +9,11 @@ from pathlib import Path, PurePosixPath
 from typing import Any
 
 import msgspec
-import numpy as np
 
-from ema_model.actuator import Actuator, parse_actuator, save_actuator
-from ema_model.actuator.write import as_toml
+from ema_model.actuator import Actuator, save_actuator
 from ema_model.errors import InputError, quoted
-from ema_model.estimation.problem import SIGNALS
 from ema_model.fleet.folders import check_same_type, units_in
-from ema_model.fleet.result import Alone, Difference, Need, OfRecording, OfType, Transfer, UnitsCompared
+from ema_model.fleet.result import UnitsCompared
 from ema_model.recordings import Measurement, read
 from ema_model.recordings.recording_set import long_enough
 from ema_model.recordings.side_file import SideFile
@@ -24,136 +21,17 @@ from emaviz.session import files as session_files
 from emaviz.session.data_folder import DataFolder
 from emaviz.session.explore import Session
 from emaviz.session.files import Practice, side_file_of
-from emaviz.session.inputs import Inputs, Provenance, digest, version_with_side
+from emaviz.session.inputs import Inputs, Provenance, Whole, digest, version_with_side
 from emaviz.session.jobs import Job, Run, Signal, Worker
 from emaviz.session.settings import taken
 
-# --- what a session's file holds of Units -----------------------------------------------------------------------------
-# What a session's file holds of Units: what is chosen, and the answer as it was found: nothing is run again.
-
-_PART = "part of Units"
-_Rows = tuple[tuple[float, ...], ...]
-
-
-class SavedAnswer(msgspec.Struct, frozen=True):
-    """`UnitsCompared` in what JSON can hold; actuators as their files' text."""
-
-    actuator: str
-    type_actuator: str
-    units: tuple[str, ...]
-    recordings: tuple[tuple[str, ...], ...]
-    held_out: tuple[tuple[str, ...], ...]
-    differences: tuple[Difference, ...]
-    dropped: tuple[Difference, ...]
-    of_type: dict[str, OfType]
-    alone: dict[str, _Rows]  # values and their σ, of each unit
-    signal: str
-    transfer: _Rows
-    transfer_floors: _Rows
-    floor: tuple[float, ...]
-    needs: tuple[Need, ...]
-    errors: tuple[float, ...]
-    warnings: tuple[str, ...]
-    of_recordings: tuple[OfRecording, ...] = ()
-
 
 class SavedUnits(msgspec.Struct, frozen=True):
-    """What is chosen, and the answer if there is one."""
+    """What a session's file holds of what is chosen; the answer stands beside."""
 
     folder: str
     rule: str
     actuator: str  # its name in the list
-    answer: SavedAnswer | None = None
-
-
-def saved(folder: str, rule: str, actuator: str, found: UnitsCompared | None) -> dict[str, Any]:
-    """In what JSON can hold."""
-    return msgspec.to_builtins(SavedUnits(folder, rule, actuator, None if found is None else _answer(found)))
-
-
-def read_saved(given: Any) -> tuple[SavedUnits, UnitsCompared | None]:
-    """What `saved` gave; InputError for what makes no sense."""
-    told: SavedUnits = taken(SavedUnits, given, _PART)
-    return told, None if told.answer is None else _found(told.answer)
-
-
-def _answer(found: UnitsCompared) -> SavedAnswer:
-    return SavedAnswer(
-        actuator=as_toml(found.actuator),
-        type_actuator=as_toml(found.type_actuator),
-        units=found.units,
-        recordings=found.recordings,
-        held_out=found.held_out,
-        differences=found.differences,
-        dropped=found.dropped,
-        of_recordings=found.of_recordings,
-        of_type=found.of_type,
-        alone={path: (_row(one.value), _row(one.sigma)) for path, one in found.alone.items()},
-        signal=found.transfer.signal,
-        transfer=_rows(found.transfer.error),
-        transfer_floors=_rows(found.transfer.floors),
-        floor=_row(found.transfer.floor),
-        needs=found.needs,
-        errors=_row(found.errors),
-        warnings=found.warnings,
-    )
-
-
-def _found(one: SavedAnswer) -> UnitsCompared:
-    actuator, count = parse_actuator(one.actuator, "the session's actuator"), len(one.units)
-    named = {path for path in (*one.of_type, *one.alone)}
-    told = [*one.differences, *one.dropped]
-    fits = (
-        count > 1
-        and len(one.recordings) == len(one.held_out) == count
-        and named == {*one.of_type} == {*one.alone} <= {*actuator.tolerances}
-        and {path for each in told for path in each.together} | {each.parameter for each in one.needs} <= named
-        and {each.unit for each in (*told, *one.needs, *one.of_recordings)} <= {*one.units}
-        and one.signal in SIGNALS
-    )
-    if not fits:
-        raise InputError(f"the session's {_PART} is damaged (its parts do not fit each other); save it anew")
-    alone = {path: Alone(*_array(rows, (2, count))) for path, rows in one.alone.items()}
-    square = (count, count)
-    return UnitsCompared(
-        actuator=actuator,
-        units=one.units,
-        recordings=one.recordings,
-        held_out=one.held_out,
-        differences=one.differences,
-        dropped=one.dropped,
-        of_recordings=one.of_recordings,
-        of_type=one.of_type,
-        alone=alone,
-        transfer=Transfer(
-            one.signal,
-            _array(one.transfer, square),
-            _array(one.floor, (count,)),
-            _array(one.transfer_floors, square),
-        ),
-        needs=one.needs,
-        errors=_array(one.errors, (count,)),
-        type_actuator=parse_actuator(one.type_actuator, "the session's type"),
-        warnings=one.warnings,
-    )
-
-
-def _array(rows: Any, shape: tuple[int, ...]) -> np.ndarray:
-    try:
-        found = np.array(rows, dtype=float)
-    except ValueError:
-        found = np.zeros(0)
-    if found.shape != shape or not np.all(np.isfinite(found)):
-        raise InputError(f"the session's {_PART} is damaged (numbers lack in it); save it anew")
-    return found
-
-
-def _row(values: np.ndarray) -> tuple[float, ...]:
-    return tuple(float(one) for one in values)
-
-
-def _rows(values: np.ndarray) -> _Rows:
-    return tuple(_row(one) for one in values)
 
 
 # --- the units of a folder: read, compared on the compute thread, and what is kept of the answer ----------------------
@@ -185,6 +63,7 @@ class ComparingUnits:
         self.actuator_name = session.actuator.name
         self.found: UnitsCompared | None = None
         self.provenance = Provenance("the comparison", "Compare units", self.inputs, self.job)
+        self.provenance.whole = Whole(lambda: None if self.found is None else self.found.stored(), self._show)
 
     def inputs(self) -> Inputs:
         """What a comparison would take now."""
@@ -303,27 +182,33 @@ class ComparingUnits:
         self._files.post(f"units {suffix}", lambda: self._keep(found, suffix))
 
     def saved(self) -> dict[str, Any]:
-        """What a session's file holds of it."""
-        return saved(self.chosen, self.rule, self.actuator_name, self.found)
+        """What a session's file holds of what is chosen."""
+        return msgspec.to_builtins(SavedUnits(self.chosen, self.rule, self.actuator_name))
+
+    def _show(self, stored: Any) -> None:
+        """An answer of a session's file; its recordings need not be there."""
+        found = UnitsCompared.restored(stored)
+        if not _fits(found):
+            raise InputError("its parts do not fit each other")
+        self.found = found
+        self.events.compared(found)
 
     def restore(self, saved: Any, names: Mapping[str, str]) -> None:
-        """Takes what `saved` gave, the answer too; its recordings need not be there.  InputError, and nothing changes.
+        """Takes what `saved` gave; InputError, and nothing changes, for what makes no sense.
 
         names: the files' names of now by those of then.
         """
         if self.job.running:
             raise InputError("units are being compared; stop that first")
-        told, found = read_saved(saved)
+        told: SavedUnits = taken(SavedUnits, saved, "part of Units")
         actuator = told.actuator
         if actuator.startswith(session_files.UPLOADED):
             name = actuator.removeprefix(session_files.UPLOADED)
             actuator = session_files.UPLOADED + names.get(name, name)
         if actuator in self.actuators():
             self.choose_actuator(actuator)
-        self.chosen, self.rule, self.found = told.folder, told.rule, found
+        self.chosen, self.rule, self.found = told.folder, told.rule, None
         self.provenance.clear()
-        if found is not None:
-            self.provenance.restored()
 
     def files(self) -> list[str]:
         """Names in the data folder of what a session needs for it."""
@@ -340,6 +225,24 @@ class ComparingUnits:
             path = self.folder.fresh(self.folder.actuators, "type", suffix)
             save_actuator(found.type_actuator, path)
         self.events.kept(path)
+
+
+def _fits(found: UnitsCompared) -> bool:
+    """Whether all that is told is of the same units and parameters."""
+    count, told = len(found.units), [*found.differences, *found.dropped, *found.needs, *found.of_recordings]
+    each = [
+        found.errors,
+        found.transfer.floor,
+        *(part for one in found.alone.values() for part in (one.value, one.sigma)),
+    ]
+    return (
+        count > 1
+        and len(found.recordings) == len(found.held_out) == count
+        and {*found.of_type} == {*found.alone} <= {*found.actuator.tolerances}
+        and {one.unit for one in told} <= {*found.units}
+        and all(one.shape == (count,) for one in each)
+        and found.transfer.error.shape == found.transfer.floors.shape == (count, count)
+    )
 
 
 def _recordings(units: Mapping[str, Sequence[Path]]) -> list[Path]:

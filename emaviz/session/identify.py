@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import copy
 from collections.abc import Callable, Generator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from datetime import datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -16,13 +16,14 @@ from ema_model.actuator import Actuator
 from ema_model.errors import InputError
 from ema_model.faults import NAMES, performance_coefficient
 from ema_model.identification.fit import CorrectedError
-from ema_model.identification.run import SEARCH_SHARE, Identification, Progress, by_one_error, steps
+from ema_model.identification.run import ALGORITHMS, SEARCH_SHARE, Identification, Progress, by_one_error, steps
 from ema_model.identification.search import Landscape, Objective, Way, extent, slices, ways
 from ema_model.identification.words import in_one_line, landscape_words
 from ema_model.quantities.numbers import amount
 from ema_model.recordings import Measurement
+from ema_model.result import restored, stored
 from ema_model.simulation import plant
-from emaviz.session.inputs import Inputs, Provenance
+from emaviz.session.inputs import Inputs, Provenance, Whole
 from emaviz.session.jobs import Job, Run, Signal, Steps, Worker, elsewhere
 from emaviz.session.settings import SLIDERS, Settings, title
 
@@ -113,6 +114,8 @@ class Race:
     growing: Path | None = None  # of the recording, while it is written
     path: Path | None = None  # and once it is whole
     error: CorrectedError | None = None  # by which all answers are compared, once all are there
+    landscape: Landscape | None = None  # as it was drawn last
+    ways: dict[str, Way] = field(default_factory=dict)  # from where the searches ended
 
     @property
     def source(self) -> str:
@@ -162,6 +165,42 @@ class Race:
             return {}
         coefficients = performance_coefficient([one[1] for one in known], [one[2] for one in known])
         return {name: float(value) for (name, _, _), value in zip(known, coefficients)}
+
+
+@dataclass(frozen=True, eq=False)
+class StoredRace:
+    """A race that is over, as a session's file has it beside its settings."""
+
+    tracks: dict[str, Track]
+    time_s: Array
+    measured_A: Array
+    truth: Array | None
+    measurement: Measurement
+    objective: Objective
+    known: bool
+    error: CorrectedError | None
+    landscape: Landscape | None
+    ways: dict[str, Way]
+    recording: str  # its file's name, "" without one
+    at: str
+
+    @classmethod
+    def of(cls, given: Any) -> StoredRace:
+        """What was stored; InputError for what is damaged, or of another version."""
+        return restored(given, cls, StoredRace._check)
+
+    def _check(self) -> None:
+        """Whatever is raised says that parts do not fit each other."""
+        tracks = self.tracks.values()
+        ended = [one.answer is not None and one.last is not None and bool(one.rmse) for one in tracks]
+        lengths = {len(one.current_A) for one in tracks if one.current_A is not None}
+        fits = ended and all(ended) and {*self.tracks} <= {*ALGORITHMS}
+        fits = fits and {len(one.k) for one in tracks if one.k is not None} == {len(NAMES)}
+        if not (fits and lengths <= {len(self.time_s)} == {len(self.measured_A)}):
+            raise ValueError("parts that do not fit each other")
+        for one in tracks:
+            _ = one.answer and (one.answer.to_dict(), str(one.answer.document))
+        datetime.fromisoformat(self.at)
 
 
 def target(
@@ -259,7 +298,6 @@ class Landscapes:
         self.job = Job(worker)
         self.grown: Signal[[Race, Landscape]] = Signal()  # called on the compute thread
         self.drawn: Signal[[Race, Mapping[str, Way]]] = Signal()  # to its end, or to where it was stopped
-        self._ways: dict[Race, dict[str, Way]] = {}  # of the last race
 
     def draw(self, race: Race, x: int, y: int, through: Floats, close: bool) -> bool:
         """Begins a slice along k x and y (0 … 7), the others held at through (8,); False while another run goes on.
@@ -278,8 +316,7 @@ class Landscapes:
         def work(asked: Run) -> Steps:
             nonlocal found
             asked("from where the searches ended to the answer")
-            if race not in self._ways:
-                self._ways = {race: ways(error, ends(race), answer)}
+            race.ways = race.ways or ways(error, ends(race), answer)
             for found in slices(error, through, x, y, across, upwards):
                 self.grown(race, found)
                 asked.say(f"{found.rows} of {len(found.upwards)} rows", found.share)
@@ -290,7 +327,8 @@ class Landscapes:
         def done() -> str | None:
             if found is None:
                 return None
-            self.drawn(race, self._ways[race])
+            race.landscape = found
+            self.drawn(race, race.ways)
             return landscape_words(found)
 
         return self.job.begin("Drawing the landscape", work, done)
@@ -323,7 +361,10 @@ class Identifying:
         self.job = Job(worker)
         self.progressed: Signal[[Race]] = Signal()
         self.identified: Signal[[Race]] = Signal()
+        self.brought: Signal[[Race]] = Signal()  # by a session
+        self.landscapes = Landscapes(worker)
         self.provenance = Provenance("the answer", "Identify", inputs, self.job)
+        self.provenance.whole = Whole(self._stored, self._show)
         self.answer: Identification | None = None
         self.race: Race | None = None  # of which it is
         self.answered_at: datetime | None = None
@@ -394,7 +435,7 @@ class Identifying:
             raise InputError("nothing is identified yet; press Identify first")
         if suffix == ".rrd":
             if race.path is None:
-                raise InputError("the recording of this identification could not be written")
+                raise InputError("the recording of this identification could not be written, or is not here any more")
             return race.path
         from emaviz.recording.entry import free_name
         from emaviz.views.export import export  # plotly takes a second to import
@@ -402,6 +443,30 @@ class Identifying:
         path = free_name(self._folder, f"{datetime.now():%Y%m%d-%H%M%S}-identify", ".html")
         export(race.best.answer, path, readable(race.settings))
         return path
+
+    # --- a session ------------------------------------------------------------------------------------------------
+
+    def _stored(self) -> Any:
+        """The last race; None without one."""
+        race = self.race
+        if race is None or self.answered_at is None:
+            return None
+        own = {one.name: getattr(race, one.name) for one in fields(StoredRace) if hasattr(race, one.name)}
+        recording = "" if race.path is None else race.path.name
+        whole = StoredRace(**own, recording=recording, at=self.answered_at.isoformat())
+        return {"settings": race.settings.saved(), "race": stored(whole)}
+
+    def _show(self, given: Any) -> None:
+        """A session's; nothing is computed.  InputError, and nothing is shown, for what makes no sense."""
+        settings = Settings(axes=self._monitor.axes)
+        settings.restore(given.get("settings"))
+        one = StoredRace.of(given.get("race"))
+        path = self._folder / Path(one.recording).name
+        own = {each.name: getattr(one, each.name) for each in fields(one) if each.name in Race.__dataclass_fields__}
+        race = Race(settings, **own, path=path if one.recording and path.is_file() else None)
+        assert race.best is not None, "each track has an answer"
+        self.answer, self.answered_at, self.race = race.best.answer, datetime.fromisoformat(one.at), race
+        self.brought(race)
 
     def _story(self, race: Race, measurement: Measurement) -> IdentificationStory | None:
         settings = race.settings

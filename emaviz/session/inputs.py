@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import hashlib
+import json
 import threading
 from collections.abc import Callable, Collection, Mapping
 from contextlib import suppress
 from dataclasses import dataclass
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -122,17 +124,20 @@ class Provenance:
         now: Callable[[], Inputs],
         job: Job | None = None,
         soon: Callable[[], object] = lambda: False,
+        reads: Callable[[], object] = lambda: False,
     ) -> None:
         """what: the result, as 'the comparison'; start: the button that computes it; now(): what that would take.
 
-        soon(): whether a run is about to begin by itself.
+        soon(): whether a run is about to begin by itself; reads(): whether what it would take is still being read.
         """
         self.what, self.start, self.now = what, start, now
         self.of: Inputs | None = None  # what is shown; None for nothing
         self.files: ResultFiles | None = None  # what can be written of it
         self.missing: SavedResult | None = None  # a session had it, and it is to be computed again
         self.whole: Whole | None = None  # where its tab does not save it among its own
-        self._job, self._soon = job, soon
+        self._job, self._soon, self._reads = job, soon, reads
+        self._why = ""  # what is missing could not be brought
+        self._is_lost = False  # it was missing before a session was saved, or without one
         self._restored = False  # a session brought the result itself
         self._is_whole = False  # it is shown as a session brought it, while its files may still be read
         self._coming: Inputs | None = None  # of the run that goes on
@@ -156,12 +161,17 @@ class Provenance:
     def take(self, of: Inputs | None = None) -> None:
         """A result is there; of: its inputs, else those of the run that goes on."""
         self.of, self.missing, self._coming = of or self._coming or self.now(), None, None
-        self._is_whole = False
+        self._is_whole, self._why = False, ""
+
+    def lose(self, of: Inputs | None, why: str) -> None:
+        """A result that was there is not: it is to be computed again."""
+        self.clear()
+        self.missing, self._why, self._is_lost = SavedResult(of), why, True
 
     def clear(self) -> None:
         """Nothing is shown any more."""
         self.of = self.missing = self._error = None
-        self._is_whole = False
+        self._is_whole, self._why, self._is_lost = False, "", False
 
     def _ended(self, job: Job) -> None:
         if job.error:
@@ -201,11 +211,13 @@ class Provenance:
                 return f"Being computed again: {had}."
             if not had:
                 return f"Not computed: {running}; {press}."
-            again = f"To be computed again: {had}, which this session was saved with; {press}."
+            why = f" ({self._why})" if self._why else ""
+            saved = "" if self._is_lost else ", which this session was saved with"
+            again = f"To be computed again: {had}{saved}{why}; {press}."
             return f"{again} {running}." if running else again
         if self.of is None:
             return ""
-        if self._is_whole and self.computing and self._coming is None:
+        if self._reads() or (self._is_whole and self.computing and self._coming is None):
             return ""  # its files are being read
         changed = self.of.changed(self.now())
         if self.computing:
@@ -224,7 +236,7 @@ class Provenance:
         job, missing = self._job, self.missing
         running = "" if job is None or not (job.running or job.waiting) else job.title
         if missing is not None:
-            return SavedResult(missing.inputs, running or missing.running)
+            return SavedResult(missing.inputs or self.of, running or missing.running)
         return SavedResult(self.of, running) if self.of is not None or running else None
 
     def restored(self) -> None:
@@ -238,10 +250,12 @@ class Provenance:
         whole: what `Whole.save` gave; where that cannot be shown, the result is to be computed again.
         """
         if whole is not None and self.whole is not None:
-            with suppress(InputError):
+            try:
                 self.whole.show(whole)
                 self.restored()
-        restored, self._restored = self._restored, False
+            except InputError as error:
+                self._why = str(error)
+        restored, self._restored, self._is_lost = self._restored, False, False
         self.missing = self._error = None
         if saved is None:
             return
@@ -251,7 +265,7 @@ class Provenance:
             self._is_whole = whole is not None
         is_here = inputs is not None and self.of is not None and not self.of.changed(inputs)
         if saved.running or not is_here:
-            self.missing = SavedResult(inputs, saved.running)
+            self.missing = SavedResult(None if is_here else inputs, saved.running)
 
 
 def results_part(members: Callable[[], Mapping[str, Provenance]]) -> Part:
@@ -273,7 +287,23 @@ def results_part(members: Callable[[], Mapping[str, Provenance]]) -> Part:
     return Part(save, restore)
 
 
-_MOST_BYTES = 100_000_000  # of one result's arrays; a larger one is computed again
+_MOST_BYTES = 100_000_000  # of one tab's arrays
+_MOST_TEXT = 1_000_000  # of all else in it, as a file has it: together they stay below what is read
+
+
+class Room:
+    """What the results of one tab may take of a session's file; one that finds no room is computed again."""
+
+    def __init__(self, text: int = _MOST_TEXT) -> None:
+        self._arrays, self._text = _MOST_BYTES, text
+
+    def take(self, found: Any) -> Any:
+        """A stored result; InputError for one that is too large."""
+        arrays, text = _bytes(found), len(json.dumps(found, default=lambda array: None))
+        if arrays > self._arrays or text > self._text:
+            raise InputError("the result is too large to be stored")
+        self._arrays, self._text = self._arrays - arrays, self._text - text
+        return found
 
 
 def _whole(of: Provenance) -> Any:
@@ -281,8 +311,7 @@ def _whole(of: Provenance) -> Any:
     if of.whole is None or of.of is None:
         return None
     with suppress(InputError):
-        found = of.whole.save()
-        return found if _bytes(found) <= _MOST_BYTES else None
+        return Room().take(of.whole.save())
     return None
 
 
@@ -294,13 +323,25 @@ def _bytes(value: Any) -> int:
     return getattr(value, "nbytes", 0)
 
 
+_MOST_READ = 100_000_000  # bytes, of a file that is known again by what is in it; a larger one by when it was written
+
+
 def version_of(path: Path, *said: object) -> str:
-    """By which a file is known again, with what was said of how to read it; '' where it is not there."""
+    """By which a file is known again, elsewhere too, with what was said of how to read it; '' where it is not there."""
     try:
         at = path.stat()
     except OSError:
         return ""
-    return " ".join((str(at.st_size), str(at.st_mtime_ns), *(digest(one) for one in said)))
+    own = str(at.st_mtime_ns) if at.st_size > _MOST_READ else _digest_of(path, at.st_size, at.st_mtime_ns)
+    return " ".join((str(at.st_size), own, *(digest(one) for one in said)))
+
+
+@lru_cache(maxsize=20_000)
+def _digest_of(path: Path, size: int, changed_ns: int) -> str:
+    """Of what is in a file, which is read again once it has another size, or was written since; else when it was."""
+    with suppress(OSError), path.open("rb") as file:
+        return hashlib.file_digest(file, lambda: hashlib.blake2b(digest_size=16)).hexdigest()
+    return str(changed_ns)
 
 
 def version_with_side(path: Path) -> str:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import filecmp
+import hashlib
 import json
 import math
 import zipfile
@@ -68,10 +69,12 @@ def write_session(path: Path, parts: Mapping[str, Part], folder: DataFolder, nam
                 side = side_path(file)
                 if side != file and side.is_file() and folder.holds(side):
                     archive.write(side, _FILES + folder.name_of(side))
-            arrays = bytearray()
-            archive.writestr(_DOCUMENT, json.dumps(_without_arrays(document, arrays), indent=1))
-            if arrays:
-                archive.writestr(_ARRAYS, bytes(arrays))
+            arrays = _Arrays()
+            archive.writestr(_DOCUMENT, json.dumps(arrays.taken_from(document), separators=(",", ":")))
+            if arrays.every:
+                archive.writestr(_ARRAYS, bytes(arrays.every))
+            if archive.getinfo(_DOCUMENT).file_size > SETTINGS_BYTES or _unpacks_to(archive) > SESSION_BYTES:
+                raise InputError(f"{quoted(path.name)}: the session is too large to be opened again; open fewer files")
     except OSError as error:
         raise InputError(f"{quoted(path.name)}: cannot be written ({error.strerror}); check the disk") from None
 
@@ -111,7 +114,7 @@ def _document(archive: SafeZip, path: Path) -> dict[str, Any]:
     if _ARRAYS in archive.names:
         arrays = archive.read(_ARRAYS)
         try:
-            document = _with_arrays(document, arrays)
+            document = _Placed(arrays).put_into(document)
         except (LookupError, OverflowError, RecursionError, TypeError, ValueError):
             raise Damaged("its arrays do not fit") from None
     if not isinstance(document, dict) or not isinstance(document.get("files", []), list):
@@ -123,34 +126,63 @@ def _document(archive: SafeZip, path: Path) -> dict[str, Any]:
     return document
 
 
-def _without_arrays(value: Any, arrays: bytearray) -> Any:
-    """A part of the document with a note in the place of each array, whose bytes are added to the others."""
-    if isinstance(value, np.ndarray):
-        plain = np.ascontiguousarray(value, value.dtype.newbyteorder("<"))
-        if plain.dtype.kind not in _PLAIN:
-            raise TypeError(f"an array of {plain.dtype} is not saved")
-        note = [plain.dtype.str, list(value.shape), len(arrays)]
-        arrays += plain.tobytes()
-        return {_ARRAY: note}
-    if isinstance(value, Mapping):
-        return {name: _without_arrays(one, arrays) for name, one in value.items()}
-    return [_without_arrays(one, arrays) for one in value] if isinstance(value, list | tuple) else value
+def _unpacks_to(archive: zipfile.ZipFile) -> int:
+    """Bytes."""
+    return sum(one.file_size for one in archive.infolist())
 
 
 _PLAIN = "biufU"  # kinds of arrays that are numbers, truths or text
 
 
-def _with_arrays(value: Any, arrays: bytes) -> Any:
-    """The same with each array in its place."""
-    if isinstance(value, dict):
-        if value.keys() != {_ARRAY}:
-            return {name: _with_arrays(one, arrays) for name, one in value.items()}
-        spelled, shape, first = value[_ARRAY]
-        kind = np.dtype(spelled)
+class _Arrays:
+    """The arrays of a document, one after another, each once: what several results are of is often the same."""
+
+    def __init__(self) -> None:
+        self.every = bytearray()
+        self._known: dict[bytes, int] = {}  # where each begins, by its digest
+
+    def taken_from(self, value: Any) -> Any:
+        """A part of the document with a note in the place of each array."""
+        if isinstance(value, np.ndarray):
+            plain = np.ascontiguousarray(value, value.dtype.newbyteorder("<"))
+            if plain.dtype.kind not in _PLAIN:
+                raise TypeError(f"an array of {plain.dtype} is not saved")
+            own = plain.tobytes()
+            first = self._known.setdefault(hashlib.blake2b(own).digest(), len(self.every))
+            if first == len(self.every):
+                self.every += own
+            return {_ARRAY: [plain.dtype.str, list(value.shape), first]}
+        if isinstance(value, Mapping):
+            return {name: self.taken_from(one) for name, one in value.items()}
+        return [self.taken_from(one) for one in value] if isinstance(value, list | tuple) else value
+
+
+class _Placed:
+    """Arrays back in the places of their notes, each made once."""
+
+    def __init__(self, every: bytes) -> None:
+        self._every, self._room = every, SESSION_BYTES
+        self._known: dict[tuple[Any, ...], np.ndarray] = {}  # by their notes
+
+    def put_into(self, value: Any) -> Any:
+        """A part of the document with its arrays; ValueError, and others, for notes that make no sense."""
+        if isinstance(value, dict):
+            if value.keys() != {_ARRAY}:
+                return {name: self.put_into(one) for name, one in value.items()}
+            spelled, shape, first = value[_ARRAY]
+            if (note := (spelled, *shape, first)) not in self._known:
+                self._known[note] = self._made(np.dtype(spelled), shape, first)
+            return self._known[note]
+        return [self.put_into(one) for one in value] if isinstance(value, list) else value
+
+    def _made(self, kind: np.dtype, shape: list[int], first: int) -> np.ndarray:
         if kind.kind not in _PLAIN or kind.itemsize == 0 or min([first, *shape]) < 0:
             raise ValueError("no array of numbers or text")
-        return np.frombuffer(arrays, kind, math.prod(shape), first).reshape(shape).copy()
-    return [_with_arrays(one, arrays) for one in value] if isinstance(value, list) else value
+        made = np.frombuffer(self._every, kind, math.prod(shape), first).reshape(shape).copy()
+        self._room -= made.nbytes
+        if self._room < 0:
+            raise ValueError("more arrays than a session's file holds")
+        return made
 
 
 def _take_files(archive: SafeZip, document: Mapping[str, Any], folder: DataFolder) -> dict[str, str]:

@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-import base64
-import binascii
 import math
 import threading
 import time
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -24,6 +22,7 @@ from ema_model.identification.run import Progress
 from ema_model.recordings import read
 from ema_model.recordings.recording_set import recordings_in
 from ema_model.recordings.side_file import SideFile
+from ema_model.result import restored, stored
 from ema_model.tracking.evidence import LEAST_FLIGHTS
 from ema_model.tracking.flights import Flight, check_enough, check_order, flights_in, identified, in_order
 from ema_model.tracking.history import History
@@ -32,48 +31,25 @@ from ema_model.tracking.track import check_thresholds
 from emaviz.session.data_folder import DataFolder
 from emaviz.session.explore import Session
 from emaviz.session.files import Practice, side_file_of
-from emaviz.session.inputs import Inputs, Provenance, version_with_side
+from emaviz.session.inputs import Inputs, Provenance, Room, version_with_side
 from emaviz.session.jobs import RESTED, Job, Run, Signal, Stopped, Worker
 from emaviz.session.settings import number, taken
 
 # --- what a session's file holds of Track -----------------------------------------------------------------------------
-# What a session's file holds of Track: thresholds and identified flights, so that none is identified again.
+# What a session's file holds of Track: thresholds, the identified flights and what was known after each.
 
-MOST = 2000  # flights, two kilobytes each; a unit with more is identified anew
 _PART = "part of Track"
-_K = len(faults.NAMES)
 
 
 class SavedFlight(msgspec.Struct, frozen=True):
-    """A flight, and the file that it was identified from, as it was then."""
+    """The file that a flight was identified from, as it was then."""
 
-    name: str
-    numbers: str  # k, own and common, one after another, as base 64 of doubles
-    excluded: str = ""
     file: str = ""  # its name in the folder
-    changed: tuple[int, int] = (0, 0)  # its size and the time of its last change
+    version: str = ""
 
     def is_of(self, path: Path) -> bool:
         """Whether a file is still the one."""
-        try:
-            return self.changed == as_it_is(path)
-        except OSError:
-            return False
-
-    @property
-    def flight(self) -> Flight:
-        """InputError for numbers that are no flight's."""
-        try:
-            numbers = np.frombuffer(base64.b64decode(self.numbers, validate=True))
-            k, own, common = np.split(numbers, [_K, _K + _K * _K])
-            own, common = own.reshape(_K, _K), common.reshape(_K, -1)
-            good = len(k) == _K and bool(np.all(np.isfinite(numbers)))
-            good = good and np.allclose(own, own.T) and bool(np.all(np.linalg.eigvalsh(own) >= 0.0))
-        except (binascii.Error, ValueError):
-            good = False
-        if not good:
-            raise InputError(f"the session's {_PART} is damaged (a flight's numbers make no sense); save it anew")
-        return Flight(self.name, k, own, common, self.excluded)
+        return bool(self.version) and self.version == version_with_side(path)
 
 
 class SavedTrack(msgspec.Struct, frozen=True):
@@ -88,33 +64,37 @@ class SavedTrack(msgspec.Struct, frozen=True):
         check_thresholds(self.thresholds)
 
 
-def as_it_is(path: Path) -> tuple[int, int]:
-    """By which a file is known again; OSError where it is not there."""
-    now = path.stat()
-    return now.st_size, now.st_mtime_ns
+@dataclass(frozen=True, eq=False)
+class StoredFlights:
+    """The flights as they were identified, and what was known after each, if there were enough of them."""
+
+    flights: list[Flight]
+    history: History | None
+
+    @classmethod
+    def of(cls, given: Any) -> StoredFlights:
+        """What was stored; InputError for what is damaged."""
+        try:
+            return restored(given, cls, StoredFlights._check)
+        except InputError:
+            raise InputError(f"the session's {_PART} is damaged (its flights make no sense); save it anew") from None
+
+    def _check(self) -> None:
+        """Whatever is raised says that parts do not fit each other."""
+        good = all(map(_makes_sense, self.flights))
+        if (history := self.history) is not None:
+            good = good and [*map(id, history.flights)] == [*map(id, self.flights)]
+            _ = history.last and (str(history.last.document), history.last.to_dict())
+        if not good:
+            raise ValueError("parts that do not fit each other")
 
 
-def saved(
-    folder: str, thresholds: Mapping[str, float], actuator: str, flights: Sequence[Flight], files: Mapping[Path, Flight]
-) -> dict[str, Any]:
-    """In what JSON can hold; files: what each flight was identified from."""
-    by_flight = {id(one): path for path, one in files.items()}
-    kept = tuple(_saved(one, by_flight.get(id(one))) for one in flights) if len(flights) <= MOST else ()
-    return msgspec.to_builtins(SavedTrack(folder, dict(thresholds), actuator, kept))
-
-
-def read_saved(given: Any) -> SavedTrack:
-    """What `saved` gave; InputError for what makes no sense."""
-    return taken(SavedTrack, given, _PART)
-
-
-def _saved(one: Flight, path: Path | None) -> SavedFlight:
-    numbers = np.concatenate([one.k, one.own.ravel(), one.common.ravel()]).astype("<f8")
-    told = SavedFlight(one.name, base64.b64encode(numbers.tobytes()).decode(), one.excluded)
-    try:
-        return told if path is None else msgspec.structs.replace(told, file=path.name, changed=as_it_is(path))
-    except OSError:  # it is gone since
-        return told
+def _makes_sense(one: Flight) -> bool:
+    """Whether its numbers are a flight's."""
+    count = len(faults.NAMES)
+    shaped = one.k.shape == (count,) and one.own.shape == (count, count) and one.common.shape[:-1] == (count,)
+    finite = shaped and all(bool(np.all(np.isfinite(part))) for part in (one.k, one.own, one.common))
+    return finite and np.allclose(one.own, one.own.T) and bool(np.all(np.linalg.eigvalsh(one.own) >= 0.0))
 
 
 # --- the flights of a folder: identified one after another, followed, and taken up as they arrive ---------------------
@@ -384,9 +364,21 @@ class Following:
     # --- what a session's file holds --------------------------------------------------------------------------------
 
     def saved(self) -> dict[str, Any]:
-        """The flights that are followed, as they were identified, and what is asked of them."""
-        flights = self._known()
-        return saved(self.chosen, self.thresholds, as_toml(self.session.actuator), flights, dict(self._flights))
+        """The flights as they were identified, what was known after each, and what is asked of them."""
+        flights, by_flight = self._known(), {id(one): path for path, one in self._flights.items()}
+        files = tuple(self._saved(by_flight.get(id(one))) for one in flights)
+        told = SavedTrack(self.chosen, dict(self.thresholds), as_toml(self.session.actuator), files)
+        history = self.history
+        if history is not None and [*map(id, history.flights)] != [*map(id, flights)]:
+            history = None  # flights came since
+        whole, room = None, Room()
+        for one in (history, None):  # the flights alone, where there is no room for more
+            with suppress(InputError):
+                whole = whole or room.take(stored(StoredFlights(flights, one)))
+        return {**msgspec.to_builtins(told), "whole": whole}
+
+    def _saved(self, path: Path | None) -> SavedFlight:
+        return SavedFlight() if path is None else SavedFlight(path.name, self._versions.get(path, ""))
 
     def _known(self) -> list[Flight]:
         """The flights that are identified, in order, also before there are enough of them to be followed."""
@@ -395,13 +387,16 @@ class Following:
         return max(self._brought_flights if self.history is None else [], history, identified, key=len)
 
     def restore(self, saved: Any) -> None:
-        """Takes what `saved` gave: its flights are followed soon, and none is identified, whether it is there or not.
+        """Takes what `saved` gave: its flights are shown as they were, and none is identified, be it there or not.
 
+        Where what was known after each flight is not in the file, it is found soon.
         InputError, and nothing changes, for what makes no sense or is of another actuator, and while flights are
         identified.
         """
-        told = read_saved(saved)
-        flights = [one.flight for one in told.flights]
+        told: SavedTrack = taken(SavedTrack, saved, _PART)
+        whole = saved.get("whole")
+        found = StoredFlights([], None) if whole is None else StoredFlights.of(whole)
+        flights = found.flights
         if flights and told.actuator != as_toml(self.session.actuator):
             raise InputError("the session's flights are of another actuator; start the app with that one")
         if len({one.common.shape for one in flights if not one.excluded}) > 1:
@@ -414,18 +409,25 @@ class Following:
             self._path = None
         self.chosen, self.thresholds, self._brought = told.folder, told.thresholds, {}
         self.history, self._growing, self.left_out, self._watched = None, None, {}, Watched()
-        files = [] if self._path is None else [self._path / Path(one.file).name for one in told.flights]
-        self._flights = {
-            path: flight for path, one, flight in zip(files, told.flights, flights) if one.file and one.is_of(path)
-        }
-        self._versions = {path: version_with_side(path) if path in self._flights else "" for path in files}
+        path = self._path
+        files = [None if path is None or not one.file else path / Path(one.file).name for one in told.flights]
+        here = [(file, one, flight) for file, one, flight in zip(files, told.flights, flights) if file is not None]
+        self._flights = {file: flight for file, one, flight in here if one.is_of(file)}
+        self._versions = {file: one.version if file in self._flights else "" for file, one, _ in here}
         self._watched.arrived(self._flights)
         self._watched.take(self._flights)
         self._looks_on = False  # flights that came since are long work, which is asked for
         self._brought_flights = flights
         self.provenance.clear()
-        if not flights:
-            return
+        if (history := found.history) is not None and history.last is not None:
+            self.history, self._growing = history, history.copy()
+            self.provenance.restored()
+            self.events.followed(history)
+        elif flights:
+            self._follow_brought(flights)
+
+    def _follow_brought(self, flights: list[Flight]) -> None:
+        """Looks after each flight of a session's, once nothing else runs."""
 
         def work(run: Run) -> None:
             if self._brought_flights is flights:  # nothing else was chosen while it waited

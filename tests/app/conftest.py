@@ -11,6 +11,9 @@ from support.browser import WINDOW
 from support.on_page import wait_until
 from support.one_tab import Tab
 
+from ema_model.identification import search
+from ema_model.models import closed_loop, inverse_dynamics
+from ema_model.simulation import compiled
 from emaviz.page.app import App
 from emaviz.session import compare
 from emaviz.session.jobs import Worker
@@ -80,6 +83,24 @@ def watched(browser: Any, app: App) -> Iterator[Any]:
     allowed = (app.address, app.viewer.address, "ws://127.0.0.1", "data:", "blob:")
     assert any(url.startswith(app.viewer.address) for url in asked)
     assert not [url for url in asked if not url.startswith(allowed)], "nothing may come from elsewhere"
+
+
+@pytest.fixture
+def computed(monkeypatch: pytest.MonkeyPatch) -> list[str]:
+    """What is simulated, and which kernels are asked for, by the name of what does it."""
+    calls: list[str] = []
+
+    def watch(module: Any, name: str) -> None:
+        plain = getattr(module, name)
+        monkeypatch.setattr(module, name, lambda *given, **more: calls.append(name) or plain(*given, **more))
+
+    for name in ("traced", "simulate_reference", "simulate_references", "own_stack", "stack_at_hand"):
+        watch(closed_loop, name)
+    for name in ("needed_currents", "stack_at_hand"):
+        watch(inverse_dynamics, name)
+    watch(search, "exclusive")
+    watch(compiled, "find_stack")
+    return calls
 
 
 @pytest.fixture

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import threading
 
+import numpy as np
 import pytest
 from support.cheap_plans import written
 from support.on_page import wait_until
@@ -12,14 +13,17 @@ from ema_model.actuator import load_actuator
 from ema_model.campaign import load_plan
 from ema_model.campaign.kinds import KINDS
 from ema_model.campaign.plan_axes import inputs_of
+from ema_model.campaign.result import Campaign
 from ema_model.campaign.rows import common
 from ema_model.campaign.store import Store, header_of
 from ema_model.errors import InputError
 from emaviz.page.campaigns import figures, label, progress_bars, tables
 from emaviz.recording import read
-from emaviz.session.campaigns import Campaigns
+from emaviz.session import session_file
+from emaviz.session.campaigns import REPORT, Campaigns
 from emaviz.session.data_folder import DataFolder
 from emaviz.session.explore import Session
+from emaviz.session.session_file import Part
 
 GROUPS = """
 [groups.worn]
@@ -35,7 +39,7 @@ seeds = [1]
 """
 
 
-def computed(folder, at):
+def made(folder, at):
     """A campaign of two kinds, computed here without a worker's settings."""
     plan = load_plan(written(at, GROUPS))
     store = Store.writing(folder, header_of("A worn one", "", plan.tasks), plan.text, plan.tasks)
@@ -51,7 +55,7 @@ def computed(folder, at):
 def data(tmp_path_factory):
     folder = DataFolder(tmp_path_factory.mktemp("data"))
     (folder.folder / "campaigns").mkdir()
-    computed(folder.folder / "campaigns" / "first", tmp_path_factory.mktemp("plan"))
+    made(folder.folder / "campaigns" / "first", tmp_path_factory.mktemp("plan"))
     return folder
 
 
@@ -128,7 +132,7 @@ def test_what_the_list_says_of_a_row(data):
 @pytest.mark.browser
 def test_a_row_is_chosen_and_opened_on_the_page(watched, app, tmp_path):
     page = watched
-    computed(app.session.folder.parent / "campaigns" / "<b>here", tmp_path)
+    made(app.session.folder.parent / "campaigns" / "<b>here", tmp_path)
     page.get_by_role("tab", name="Runs").click()
     page.get_by_text("Campaigns", exact=True).click()
     page.get_by_role("button", name="Look for campaigns again").click()
@@ -140,3 +144,78 @@ def test_a_row_is_chosen_and_opened_on_the_page(watched, app, tmp_path):
     frame.locator("#the_canvas_id").wait_for(timeout=120_000, state="attached")
     page.get_by_role("tab", name="Campaign", exact=True).click()
     page.get_by_text("A worn one").wait_for()
+
+
+def through_a_file(data, saved, name):
+    """What is saved as a session's file gives it back."""
+    back = []
+    path = session_file.free_path(data, name)
+    session_file.write_session(path, {"campaign": Part(lambda: saved, lambda *_: None)}, data, [])
+    session_file.read_session(path, {"campaign": Part(dict, lambda given, _: back.append(given))}, data)
+    return back[0]
+
+
+def drawn(store):
+    """All that the page draws of a campaign."""
+    rows = [store.table(kind, how=True).to_pylist() for kind in store.header.kinds.values()]
+    labels = [label(row, number) for one in rows for number, row in enumerate(one)]
+    pictures = [figure.to_json() for figure in figures(store)]
+    return [str(progress_bars(store)), str(tables(store)), pictures, labels, Campaign(store).document.text, rows]
+
+
+def test_a_session_brings_its_campaign_to_another_folder(session, data, tmp_path, computed):
+    there = DataFolder(tmp_path / "there")
+    other = Campaigns(Session(load_actuator(), there.recordings), there)
+    campaigns = Campaigns(session, data)
+    before = drawn(campaigns.store("campaigns/first"))
+    Campaign(campaigns.store("campaigns/first")).export(data.folder / "campaigns" / "first" / REPORT)
+    assert campaigns.has_report("campaigns/first")
+    saved = through_a_file(there, campaigns.saved("campaigns/first"), "campaign")
+    computed.clear()
+    assert other.restore(saved) == "campaigns/first" and other.names() == ["campaigns/first"]
+    assert other.has_report("campaigns/first") and not (there.folder / "campaigns" / "first" / REPORT).exists()
+    report = other.report(f"campaigns/first/{REPORT}")
+    assert report is not None and report.read_text().startswith("<!"), "written when it is asked for"
+    assert drawn(other.store("campaigns/first")) == before and not computed
+    assert other.restore(saved) == "campaigns/first" and len(other.names()) == 1, "it is there"
+    assert campaigns.restore(saved) == "campaigns/first" and len(campaigns.names()) == 1, "where it was saved, too"
+    (there.folder / "campaigns" / "first" / "plan.toml").write_text("another")
+    assert other.restore(saved) == "campaigns/first (2)" and drawn(other.store("campaigns/first (2)")) == before
+    row = other.store("campaigns/first").table("identify").to_pylist()[0]
+    assert other.store("campaigns/first").task(row).actuator, "a row can be computed again"
+    assert campaigns.saved("nothing") is None and campaigns.saved("../../etc") is None
+
+
+@pytest.mark.parametrize(
+    "damage",
+    [
+        lambda one: one.update({"name": 7}),
+        lambda one: one.update({"campaign": 7}),
+        lambda one: one["campaign"].update({"class": "Path"}),
+        lambda one: one["campaign"]["fields"]["rows"][0].__setitem__(0, "../../evil"),
+        lambda one: one["campaign"]["fields"]["rows"][0].__setitem__(1, np.frombuffer(b"[[[", np.uint8)),
+        lambda one: one["campaign"]["fields"]["rows"][0].__setitem__(1, np.frombuffer(b'[{"name": [7]}]', np.uint8)),
+        lambda one: one["campaign"]["fields"]["rows"][0].__setitem__(1, np.zeros(3)),
+        lambda one: one["campaign"]["fields"]["actuators"].append(["../../evil", "x"]),
+        lambda one: one["campaign"]["fields"]["header"]["fields"].update({"schema": 99}),
+    ],
+)
+def test_a_damaged_campaign_of_a_session_is_refused_in_one_line_and_leaves_nothing(session, data, tmp_path, damage):
+    there = DataFolder(tmp_path / "there")
+    other = Campaigns(session, there)
+    saved = through_a_file(there, Campaigns(session, data).saved("campaigns/first"), "campaign")
+    damage(saved)
+    with pytest.raises(InputError) as told:
+        other.restore(saved)
+    assert "\n" not in str(told.value) and not other.names()
+    assert not [one for one in there.folder.rglob("*") if one.is_file() and one.suffix != ".emaviz"]
+    assert not (tmp_path / "evil.toml").exists()
+
+
+def test_a_name_of_a_session_that_leads_outside_stays_inside(session, data, tmp_path):
+    there = DataFolder(tmp_path / "there")
+    saved = Campaigns(session, data).saved("campaigns/first")
+    for name in ("../../evil", "/etc/passwd", "a/../..", "\0"):
+        told = Campaigns(session, there).restore({**saved, "name": name})
+        assert (there.folder / told).resolve().is_relative_to(there.folder)
+    assert not (tmp_path / "evil").exists()

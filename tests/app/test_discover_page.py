@@ -278,12 +278,10 @@ def test_stop_works_and_a_session_brings_the_ladder_back(discover, app):
     page.get_by_role("tab", name="Runs", exact=True).click()
     page.get_by_role("button", name="Load session").click()
     page.get_by_role("tab", name="Discover", exact=True).click()
-    page.get_by_text("Taking the session's steps again").first.wait_for(timeout=60_000)
-    wait_until(lambda: not app.discovering.running)
     page.get_by_role("button", name="Remove Cogging torque").wait_for()
+    assert not app.discovering.running, "nothing is computed"
     assert page.get_by_label("Measurements", exact=True).input_value().endswith("First bench run")
-    again = errors(app)
-    assert again[0] == pytest.approx(fitted, rel=0.01) and again[1] == pytest.approx(held, rel=0.01)
+    assert errors(app) == (fitted, held)
     wait_until(lambda: drawn(page, "Error after each step") == 2)
     page.locator("math", has_text="sin").first.wait_for()
 
@@ -329,7 +327,7 @@ def test_a_challenge_of_ones_own_is_sealed_sent_opened_and_revealed(discover, ap
     assert sent.value.suggested_filename.endswith(".challenge")
     mine = tmp_path / "from a colleague.challenge"
     sent.value.save_as(mine)
-    (kept,) = app.comparing.folder.challenges.glob("*.challenge")
+    kept = max(app.comparing.folder.challenges.glob("*.challenge"), key=lambda one: one.stat().st_mtime_ns)
     assert kept.read_bytes() == mine.read_bytes()
     settings.remove_effect("cogging_torque")
     app.screen.post("test", app.tab(ExploreTab).panel.show_settings)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import shutil
 
 import numpy as np
@@ -14,9 +13,11 @@ from support.on_page import wait_until
 from ema_model.actuator import load_actuator
 from ema_model.errors import InputError
 from emaviz.recording import read
+from emaviz.session import session_file
 from emaviz.session.data_folder import DataFolder
 from emaviz.session.explore import Session
 from emaviz.session.jobs import Worker
+from emaviz.session.session_file import Part
 from emaviz.session.track import Following
 
 COUNT = 20
@@ -181,12 +182,30 @@ def another(following):
     return new
 
 
+def through_a_file(following, saved):
+    """What is saved as a session's file gives it back."""
+    back, folder = [], following.folder
+    path = session_file.free_path(folder, "kept")
+    session_file.write_session(path, {"track": Part(lambda: saved, lambda *_: None)}, folder, [])
+    session_file.read_session(path, {"track": Part(dict, lambda given, _: back.append(given))}, folder)
+    return back[0]
+
+
 def restored(new, saved):
-    shown = []
+    shown, begun = [], []
     new.events.followed.connect(shown.append)
-    new.restore(json.loads(json.dumps(saved)))
-    wait_until(lambda: shown and not new.job.running)
+    new.job.began.connect(begun.append)
+    new.restore(through_a_file(new, saved))
+    assert len(shown) == 1 and not begun and not new.job.waiting, "nothing is computed"
     return shown[-1]
+
+
+def drawn(history):
+    """All that the page draws: each look, and what came then."""
+    figures = [figure.to_json() for figure in history.last.figures()]
+    looks = {count: [one.to_dict(), one.document.text] for count, one in history.looks.items()}
+    came = {(number, name): history.came(number, name) for number in history.looks for name in history.last.faults}
+    return [looks, came, figures, [one.name for one in history.flights], history.thresholds]
 
 
 def test_a_session_keeps_the_flights_so_that_none_is_identified_again(following, asked):
@@ -195,16 +214,20 @@ def test_a_session_keeps_the_flights_so_that_none_is_identified_again(following,
     following.set_threshold("k1", 0.6)
     followed(following)
     saved, before = following.saved(), following.last
+    pictures = drawn(following.history)
     del asked[:]
     new = another(following)
-    last = restored(new, saved).last
+    history = restored(new, saved)
+    last = history.last
+    assert drawn(history) == pictures
     assert not asked and new.chosen == "unit" and new.thresholds == {"k1": 0.6}
     assert (
         str(last) == str(before)
         and last.faults["k1"].remaining_flights.p50 == before.faults["k1"].remaining_flights.p50
     )
     assert new.file_of(last.flights[3]) == "unit/flight_03.parquet"
-    assert new.saved() == saved
+    again = new.saved()
+    assert {**again, "whole": 0} == {**saved, "whole": 0} and drawn(restored(new, again)) == pictures
     new.watching = True
     new._watch()
     shutil.copy(
@@ -216,7 +239,7 @@ def test_a_session_keeps_the_flights_so_that_none_is_identified_again(following,
     (following.folder.folder / "unit" / "flight_20.parquet").unlink()
     del asked[:]
 
-    recording(following.folder.folder / "unit" / "flight_05.parquet")  # another one by now
+    recording(following.folder.folder / "unit" / "flight_05.parquet", 2.0)  # another one by now
     (following.folder.folder / "unit" / "flight_06.parquet").unlink()
     new = another(following)
     flight = restored(new, saved).last.flights[5]
@@ -237,8 +260,9 @@ def test_a_session_keeps_the_flights_so_that_none_is_identified_again(following,
     [
         ({"thresholds": {"k9": 0.5}}, "no such fault"),
         ({"actuator": "another"}, "are of another actuator"),
-        ({"flights": [{"name": "a", "numbers": "AAAA"}]}, "numbers make no sense"),
-        ({"flights": [{"name": "a", "numbers": "no base 64"}]}, "numbers make no sense"),
+        ({"whole": {"class": "StoredFlights", "fields": {"flights": 7, "history": None}}}, "flights make no sense"),
+        ({"whole": {"class": "Path", "fields": {}}}, "flights make no sense"),
+        ({"whole": 7}, "flights make no sense"),
         ({"flights": 7}, "is damaged"),
     ],
 )
@@ -249,4 +273,40 @@ def test_a_damaged_session_is_refused_in_one_line_and_changes_nothing(following,
     saved = following.saved()
     with pytest.raises(InputError, match=line) as told:
         following.restore(saved | damage)
-    assert "\n" not in str(told.value) and following.saved() == saved
+    assert "\n" not in str(told.value) and {**following.saved(), "whole": 0} == {**saved, "whole": 0}
+
+
+def test_numbers_that_are_no_flights_are_refused(following):
+    following.watching = False
+    following.choose("unit")
+    followed(following)
+    for part, bad in (("k", np.full(8, np.nan)), ("own", -np.eye(8)), ("common", np.zeros(3)), ("k", np.zeros(3))):
+        saved = following.saved()
+        saved["whole"]["fields"]["flights"][3]["fields"][part] = bad
+        with pytest.raises(InputError, match="flights make no sense"):
+            following.restore(saved)
+    saved = following.saved()
+    saved["whole"]["fields"]["history"]["fields"]["looks"][0][0] = 999
+    with pytest.raises(InputError, match="flights make no sense"):
+        following.restore(saved)
+
+
+def test_a_session_of_before_looks_were_stored_has_no_flights(following):
+    old = {"folder": "unit", "thresholds": {"k1": 0.6}, "flights": [{"name": "a", "numbers": "AAAA", "file": "a.csv"}]}
+    following.restore(old)
+    assert following.chosen == "unit" and following.history is None and following.thresholds == {"k1": 0.6}
+    assert not following.job.running and not following.job.waiting
+
+
+def test_flights_of_a_session_without_room_for_what_was_known_after_each_are_followed_again(following, asked):
+    following.watching = False
+    following.choose("unit")
+    followed(following)
+    saved = following.saved()
+    saved["whole"]["fields"]["history"] = None
+    del asked[:]
+    new, shown = another(following), []
+    new.events.followed.connect(shown.append)
+    new.restore(saved)
+    wait_until(lambda: shown and not new.job.running)
+    assert not asked and str(new.last) == str(following.last)

@@ -17,15 +17,15 @@ from ema_model.commands import command
 from ema_model.faults import HEALTHY
 from ema_model.recordings import write_measurement
 from ema_model.simulation.run import Run, simulate_reference
+from ema_model.tracking.flights import Flight
 from emaviz.session import session_file
 from emaviz.session.campaigns import Campaigns
 from emaviz.session.compare import Comparing
 from emaviz.session.data_folder import DataFolder
 from emaviz.session.discover.discovering import Discovering
-from emaviz.session.discover.history import Entry
 from emaviz.session.explore import Session
 from emaviz.session.fleet import ComparingUnits
-from emaviz.session.inputs import Inputs, Provenance, results_part
+from emaviz.session.inputs import Inputs, Provenance, results_part, version_of
 from emaviz.session.jobs import Job, Worker
 from emaviz.session.jobs import Run as JobRun
 from emaviz.session.session_file import Part
@@ -254,6 +254,19 @@ def test_a_session_says_what_must_be_computed_again_and_what_to_press(app, tab):
     assert provenance.line() == ""
 
 
+def test_a_file_is_known_again_by_what_is_in_it(tmp_path):
+    """Also where a session has taken it to another folder, and where it was written again as it was."""
+    one, other = tmp_path / "a.csv", tmp_path / "elsewhere.csv"
+    one.write_text("time_s,current_A\n0,1\n")
+    other.write_bytes(one.read_bytes())
+    os.utime(other, ns=(1, 1))
+    assert version_of(one) == version_of(other) != ""
+    other.write_text("time_s,current_A\n0,2\n")  # of the same length
+    os.utime(other, ns=(2, 2))
+    assert version_of(one) != version_of(other) and version_of(tmp_path / "none.csv") == ""
+    assert version_of(one, "read so") != version_of(one, "read otherwise")
+
+
 def test_what_was_running_is_said_too(app):
     job, provenance = app.compare.job, app.compare.provenance
     job.running, job._run = True, JobRun("Calibrating and comparing", print, app.session.worker)
@@ -264,6 +277,21 @@ def test_what_was_running_is_said_too(app):
     assert provenance.line() == (
         "Not computed: “Calibrating and comparing” was running when this session was saved; press Compare."
     )
+
+
+def test_a_result_that_is_here_is_not_said_to_be_missing_for_what_was_running_beside_it(app):
+    job, provenance = app.units.job, app.units.provenance
+    provenance.take()
+    job.running, job._run = True, JobRun("Comparing units", print, app.session.worker)
+    saved = results_part(lambda: members(app)).save()
+    job.running = False
+    provenance.clear()
+    provenance.restored()
+    brought(app, saved)
+    assert provenance.line() == (
+        "Not computed: “Comparing units” was running when this session was saved; press Compare units."
+    )
+    assert results_part(lambda: members(app)).save() == saved
 
 
 def test_a_result_that_a_session_brings_itself_keeps_what_it_is_of(app):
@@ -294,19 +322,19 @@ def test_a_session_of_today_and_one_without_results_are_both_read(app, tmp_path)
 
 def test_flights_that_were_identified_so_far_are_saved(app):
     """Also before there are enough of them to be followed, as while they are being identified."""
-    flight = SimpleNamespace(name="chirp", k=np.zeros(8), own=np.eye(8), common=np.zeros((8, 3)), excluded="")
+    flight = Flight("chirp", np.zeros(8), np.eye(8), np.zeros((8, 3)))
     app.track._flights = {app.data.folder / "bench" / "flight_1.csv": flight}
-    assert [one["name"] for one in app.track.saved()["flights"]] == ["chirp"]
+    saved = app.track.saved()
+    assert [one["file"] for one in saved["flights"]] == ["flight_1.csv"]
+    assert [one["fields"]["name"] for one in saved["whole"]["fields"]["flights"]] == ["chirp"]
 
 
-def test_steps_that_a_session_brought_are_not_lost_when_they_are_stopped(app, monkeypatch):
+def test_a_discovery_whose_story_is_not_there_is_not_lost_when_it_is_saved_again(app):
     discover = app.discover
-    saved = {"recipe": {"challenge": "first_bench_run"}, "steps": [{"model": "x", "starts": {}}]}
-    monkeypatch.setattr(app.session.worker, "start", lambda *_: False)  # it has to wait
+    saved = {"recipe": {"challenge": "first_bench_run"}, "says": "1 added, 1.1 × floor"}
     discover.restore(saved, {})
-    entry = discover.entries.current
-    assert isinstance(entry, Entry) and discover.job.waiting
-    discover.job.stop()
-    assert len(discover.saved()["steps"]) == 1
-    assert discover.start() and discover.job.waiting and discover.entries.current is entry
-    assert len(discover.entries.all) == 1 and len(discover.saved()["steps"]) == 1
+    assert not discover.running and not discover.job.waiting and len(discover.entries.all) == 1
+    again = discover.saved()
+    assert again["recipe"]["challenge"] == "first_bench_run" and again["says"] == saved["says"]
+    discover.restore(again, {})
+    assert len(discover.entries.all) == 1

@@ -29,7 +29,7 @@ def test_candidates_are_shown_as_algebra_ranks_them_and_again_as_each_is_refitte
     def looked(look):
         if look is not None and look.assessment is not None:
             known = look.assessment
-            seen.append((discovering.is_refining, len(known.refitted), known.refits is not None))
+            seen.append((discovering.is_refining, len(known.refitted), known.is_refined))
             ranked.append(look)
 
     discovering.events.looked.connect(looked)
@@ -39,7 +39,7 @@ def test_candidates_are_shown_as_algebra_ranks_them_and_again_as_each_is_refitte
     finally:
         discovering.events.looked.disconnect(looked)
     assert seen[0] == (False, 0, False) and (True, 0, False) in seen, "before anything is refitted"
-    assert seen[-1][1:] == (len(ranked[-1].assessment.refits.contenders), True) and seen[-1][1] > 0
+    assert seen[-1][1:] == (len(discovering._shown.told.refits.contenders), True) and seen[-1][1] > 0
     best, first = ranked[-1].promising[0], ranked[0].promising[0]
     assert best.name == first.name == "cogging_torque" and best.refitted_drop > 0.0 and first.refitted_drop is None
     algebra, refitted = ranked[0].predicted_rmse(first), ranked[-1].predicted_rmse(best)
@@ -66,7 +66,7 @@ def test_a_step_that_is_asked_for_ends_the_refits(discovering):
     finally:
         discovering.events.looked.disconnect(looked)
     assert asked == [False] and not discovering.job.finished, "they were stopped"
-    assert discovering.look.assessment.refits is None and discovering.look.promising
+    assert not discovering.look.assessment.is_refined and discovering.look.promising
     assert discovering.add("cogging_torque")
     wait_until(lambda: not discovering.running)
     assert discovering.look.removable == ["cogging_torque"]

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import json
 import math
+import re
+import threading
 import zipfile
 
 import numpy as np
@@ -17,10 +19,15 @@ from ema_model.faults import HEALTHY
 from ema_model.recordings import write_measurement
 from ema_model.simulation.run import Run, simulate_reference
 from emaviz.figures.identification import Row
+from emaviz.page.app import App
 from emaviz.page.compare.tab import Asked
 from emaviz.page.compare.tab import kept as compare_kept
-from emaviz.page.playback import Looks
+from emaviz.page.discover.tab import DiscoverTab
+from emaviz.page.identify.tab import IdentifyTab
+from emaviz.page.playback import Looks, PlaybackStrip
 from emaviz.page.runs import RunsTab
+from emaviz.page.tab import Shared
+from emaviz.page.workspaces import Page, Workspaces
 from emaviz.session import session_file
 from emaviz.session.compare import Comparing
 from emaviz.session.data_folder import DataFolder
@@ -123,10 +130,10 @@ def test_damaged_settings_are_refused_and_change_nothing(damage):
         ),
         (
             SavedStory,
-            {"recipe": {"window_s": [0.0, math.inf]}, "steps": []},
+            {"recipe": {"window_s": [0.0, math.inf]}},
             "a window has",
         ),
-        (SavedStory, {"recipe": {}, "steps": [{"model": "", "starts": {"x": 1e9}}]}, ""),
+        (SavedStory, {"recipe": {}, "number": -1}, "Expected `int` >= 0"),
     ],
 )
 def test_what_a_part_of_a_session_lacks_is_said_in_one_line_with_its_place(kind, saved, line):
@@ -429,3 +436,140 @@ def test_a_session_is_saved_and_loaded_with_all_that_is_on_the_page(page, app, t
     assert not page.get_by_label("Honey Badger", exact=True).is_checked()
     assert page.get_by_label("Identify", exact=True).input_value() == "uploads/bench.csv"
     settings.restore(Settings().saved())
+
+
+def with_arrays(folder, name, saved):
+    """What is in the zip of a session, and what is read from it."""
+    back, path = [], session_file.free_path(folder, name)
+    session_file.write_session(path, {"a": Part(lambda: saved, lambda *_: None)}, folder, [])
+    session_file.read_session(path, {"a": Part(dict, lambda given, _: back.append(given))}, folder)
+    with zipfile.ZipFile(path) as archive:
+        return {one: archive.read(one) for one in archive.namelist()}, back[0]
+
+
+def test_each_array_is_in_a_session_once_and_comes_back_in_all_places(folder):
+    one = np.arange(1000.0)
+    saved = {"a": one, "b": [one.copy(), one[::2]], "c": np.zeros((0, 3)), "d": np.array([True, False]), "e": 7}
+    files, back = with_arrays(folder, "once", saved)
+    assert len(files["arrays.bin"]) == 8000 + 4000 + 2
+    assert np.array_equal(back["a"], one) and back["a"] is back["b"][0] and np.array_equal(back["b"][1], one[::2])
+    assert back["c"].shape == (0, 3) and back["d"].dtype == bool and back["e"] == 7
+
+
+def test_arrays_that_are_more_than_a_session_holds_are_refused(folder, tmp_path, monkeypatch):
+    """A small file whose notes ask for the same bytes again and again, each time in another shape."""
+    files, _ = with_arrays(folder, "bomb", {"a": np.arange(1000.0)})
+    document = json.loads(files["session.json"])
+    document["a"] = [{"__array__": ["<f8", [1000 - i], 0]} for i in range(100)]
+    archive_with(tmp_path / "bomb.emaviz", {**files, "session.json": json.dumps(document)})
+    monkeypatch.setattr(session_file, "SESSION_BYTES", 100_000)
+    with pytest.raises(InputError, match="its arrays do not fit"):
+        session_file.read_session(tmp_path / "bomb.emaviz", {}, folder)
+    with pytest.raises(InputError, match="too large to be opened again"):
+        with_arrays(folder, "large", {"a": np.arange(20_000.0)})
+    assert folder.session_files() == ["sessions/bomb.emaviz"], "nothing is left behind"
+
+
+# --- a whole page, in an app that has computed nothing ----------------------------------------------------------------
+
+
+def drawn(tab):
+    """What a tab shows, by where its code has it: texts, figures, choices."""
+    found, seen = {}, set()
+
+    def walk(of, path):
+        if id(of) in seen or isinstance(of, Page | Shared | PlaybackStrip | App):
+            return
+        seen.add(id(of))
+        if isinstance(of, dict):
+            parts = of.items()
+        elif isinstance(of, list | tuple):
+            parts = enumerate(of)
+        elif type(of).__module__.startswith("viser."):
+            impl = getattr(of, "_impl", None)
+            props = {} if impl is None else {name: getattr(impl.props, name, None) for name in SHOWN}
+            found[path] = {**props, "value": getattr(impl, "value", None)}
+            return
+        elif type(of).__module__.startswith(("emaviz.page.", "emaviz.figures.")) and hasattr(of, "__dict__"):
+            parts = vars(of).items()
+        else:
+            return
+        for name, part in parts:
+            walk(part, f"{path}.{name}")
+
+    walk(tab.panel, "panel")
+    walk(tab.result, "result")
+    ids = re.compile(r"[0-9a-f]{8}-[0-9a-f]{4}-[0-9a-f]{4}-[0-9a-f]{4}-[0-9a-f]{12}")
+    return {
+        path: json.loads(ids.sub("", json.dumps(one, default=lambda at: np.asarray(at).tolist())))
+        for path, one in found.items()
+    }
+
+
+SHOWN = ("content", "visible", "label", "_plotly_json_str", "data", "options", "disabled")
+
+
+def at_rest(app):
+    """Everything that was asked is computed and drawn."""
+    wait_until(lambda: not (app.discovering.running or app.session.worker.busy), 240.0)
+    for _ in range(2):
+        for worker in (app.screen, app._slow_screen, app._files):
+            done = threading.Event()
+            worker.post("at rest", done.set)
+            assert done.wait(60.0)
+
+
+@pytest.fixture
+def apps(tmp_path, monkeypatch):
+    """Two apps that draw all tabs, as if each was looked at."""
+    monkeypatch.setattr(Workspaces, "anyone", lambda self, name: True)
+    made = [App("127.0.0.1", 0, tmp_path / name) for name in ("here", "there")]
+    for one in made:
+        assert one.wait_for_first_picture(120.0)
+    yield made
+    for one in made:
+        one.close()
+
+
+@pytest.mark.long
+def test_a_whole_session_is_drawn_as_it_was_by_an_app_that_computes_nothing(apps, computed):
+    here, there = apps
+    discovering, session = here.discovering, here.session
+    discovering.choose("first_bench_run")
+    for begin in (discovering.start, lambda: discovering.add("cogging_torque")):
+        assert begin()
+        wait_until(lambda: not discovering.running, 240.0)
+    session.settings.set_fault(2, 0.3)
+    for name, value in (("algorithms", ["do", "robust"]), ("population", 12), ("iterations", 6)):
+        session.settings.set(name, value)
+    here.screen.post("settings", lambda: [tab.show_settings() for tab in here.shared.tabs.values()])
+    assert session.identify()
+    wait_until(lambda: session.identifying.race is not None and not session.identifying.job.running, 120.0)
+    at_rest(here)
+    here.tab(RunsTab).sessions._save(None)
+    (name,) = here.comparing.folder.session_files()
+    path = here.comparing.folder.session(name)
+
+    told, begun = [], []
+    there.session.events.told.connect(lambda *line: told.append(line))
+    for job in (there.discovering.job, there.session.identifying.job, there.comparing.job):
+        job.began.connect(begun.append)
+    at_rest(there)
+    computed.clear()
+    there.screen.post("load", lambda: there.tab(RunsTab).sessions._read(path))
+    at_rest(there)
+    assert not begun and not told and not there.standings.lines()
+    assert {*computed} <= {"find_stack"}, "Explore's own plant is shown with the session's faults"
+
+    for kind, of_this_run in (
+        (DiscoverTab, ("panel._line", "panel._result._left")),  # what ran here; the plot of a folder that is not shown
+        (
+            IdentifyTab,
+            ("panel._line", "panel._link", "panel._watch", "panel._result._empty"),
+        ),  # likewise; its recording
+    ):
+        before, after = drawn(here.tab(kind)), drawn(there.tab(kind))
+        assert before.keys() == after.keys() and len(before) > 20
+        other = [path for path in before if before[path] != after[path] and not path.startswith(of_this_run)]
+        assert not other, [(path, before[path], after[path]) for path in other[:3]]
+        assert sum(bool(one.get("_plotly_json_str") or one.get("data")) for one in after.values()) >= 2

@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
-import json
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from ema_model.actuator import load_actuator
-from ema_model.errors import InputError
 from ema_model.fleet.result import Alone, Difference, Need, OfRecording, OfType, Transfer, UnitsCompared
-from emaviz.session.fleet import read_saved, saved
+from emaviz.session import session_file
+from emaviz.session.data_folder import DataFolder
+from emaviz.session.explore import Session
+from emaviz.session.fleet import ComparingUnits
+from emaviz.session.inputs import results_part
+from emaviz.session.jobs import Worker
+from emaviz.session.session_file import Part
 
 ACTUATOR = load_actuator()
 PLAY, GAIN = "transmission.backlash_rad", "controller.speed_gain_Nms_rad"
@@ -34,35 +38,97 @@ FOUND = UnitsCompared(
 )
 
 
-def kept(found: UnitsCompared | None = FOUND):
-    return json.loads(json.dumps(saved("fleet", "*unseen*", ACTUATOR.name, found)))
+class Chosen:
+    """A session with units that were compared."""
+
+    def __init__(self, folder):
+        self.folder = DataFolder(folder)
+        self.session = Session(ACTUATOR, self.folder.recordings)
+        self.files = Worker("test-files", lambda error: pytest.fail(str(error)))
+        self.units = ComparingUnits(self.session, self.folder, self.files)
+        results = results_part(lambda: {"units": self.units.provenance})
+        self.parts = {"units": Part(self.units.saved, self.units.restore, self.units.files), "results": results}
+        self.shown, self.begun = [], []
+        self.units.events.compared.connect(self.shown.append)
+        self.units.job.began.connect(self.begun.append)
+
+    def save(self):
+        path = session_file.free_path(self.folder, "kept")
+        session_file.write_session(path, self.parts, self.folder, [])
+        return path
+
+    def load(self, path):
+        session_file.read_session(path, self.parts, self.folder)
+
+    def close(self):
+        self.files.close()
+        self.session.close()
 
 
-def test_the_answer_comes_back_whole():
-    told, again = read_saved(kept())
-    assert (told.folder, told.rule, told.actuator) == ("fleet", "*unseen*", ACTUATOR.name)
-    assert again is not None and again.to_dict() == FOUND.to_dict() and str(again) == str(FOUND)
+@pytest.fixture
+def sessions(tmp_path):
+    made = [Chosen(tmp_path / name) for name in ("here", "there")]
+    yield made
+    for one in made:
+        one.close()
+
+
+def compared(one):
+    one.units.chosen, one.units.found = "fleet", FOUND
+    one.units.provenance.take()
+    return one
+
+
+def drawn(found):
+    """All that the page draws."""
+    return [found.to_dict(), found.document.text, [figure.to_json() for figure in found.figures()], str(found)]
+
+
+def test_the_answer_comes_back_whole(sessions, computed):
+    here, there = sessions
+    there.load(compared(here).save())
+    (again,) = there.shown
+    assert drawn(again) == drawn(FOUND) and again is there.units.found and not there.begun and not computed
+    assert (there.units.chosen, there.units.rule, there.units.actuator_name) == ("fleet", "*unseen*", ACTUATOR.name)
     assert again.type_actuator.value(PLAY) == 1.1e-5 and again.actuator.tolerances == ACTUATOR.tolerances
-    assert read_saved(kept(None))[1] is None
+    assert there.units.provenance.line() == "", "its folder is not here, so that nothing is known of it"
+    here.units.found = None
+    here.units.provenance.clear()
+    there.load(here.save())
+    assert there.units.found is None and there.units.provenance.line() == ""
 
 
 @pytest.mark.parametrize(
     "damage",
     [
         {"units": ["a"]},
-        {"units": ["a", "c"]},
-        {"transfer": [[1.0, 2.0], [3.0]]},
-        {"errors": [1.0, float("nan")]},
-        {"alone": {PLAY: [[1.0, 2.0], [1.0, 2.0]]}},
-        {"signal": "colour"},
+        {"transfer": 7},
+        {"errors": "many"},
+        {"alone": []},
         {"actuator": "no file"},
-        {"of_type": {}},
+        {"of_type": 7},
         {"differences": [{"unit": "b"}]},
+        {"more": 1},
     ],
 )
-def test_what_makes_no_sense_is_refused_in_one_line(damage):
-    given = kept()
-    given["answer"] |= damage
-    with pytest.raises(InputError, match="the session's") as told:
-        read_saved(given)
-    assert "\n" not in str(told.value)
+def test_what_makes_no_sense_is_to_be_computed_again(sessions, damage):
+    here, there = sessions
+    saved = {name: part.save() for name, part in compared(here).parts.items()}
+    saved["results"]["units"]["whole"]["fields"] |= damage
+    for name, part in there.parts.items():
+        part.restore(saved[name], {})
+    line = there.units.provenance.line()
+    assert line.startswith("To be computed again: the comparison of fleet, which this session was saved with (")
+    assert line.endswith("); press Compare units.") and "\n" not in line and there.units.found is None
+
+
+def test_a_session_of_before_says_what_is_to_be_computed_again(sessions):
+    here, there = sessions
+    saved = {name: part.save() for name, part in compared(here).parts.items()}
+    del saved["results"]["units"]["whole"]
+    saved["units"]["answer"] = {"units": ["a", "b"]}
+    for name, part in there.parts.items():
+        part.restore(saved[name], {})
+    assert there.units.provenance.line() == (
+        "To be computed again: the comparison of fleet, which this session was saved with; press Compare units."
+    )

@@ -289,4 +289,5 @@ def test_several_discoveries_are_saved_and_brought(app):
     entries.all.append(more)
     both = app.discovering.saved()
     entries.all.remove(more)
-    assert len(both["others"]) == 1 and both["others"][0]["says"] == more.result
+    says = {one["number"]: one["says"] for one in (both, *both["others"])}
+    assert says == {one.number: one.result for one in [*entries.all, more]}

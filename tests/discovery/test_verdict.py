@@ -32,7 +32,7 @@ def sharper(story, times: float):
     data = replace(story.data, floors=floors, after_fit=after)
     fits = [replace(one.fit, calibration=_counted(one.fit.calibration, times)) for one in story.steps]
     steps = [Step(fit, rung_of(one.rung.change, fit, data, None), one.added) for fit, one in zip(fits, story.steps)]
-    return replace(story, data=data, held=None, steps=steps, _calm={})
+    return replace(story, data=data, held=None, steps=steps, calm={})
 
 
 def _finer(floor, times: float):

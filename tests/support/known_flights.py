@@ -15,11 +15,11 @@ from ema_model.tracking.flights import Flight
 FOLLOWING = "emaviz.session.track"
 
 
-def recording(path: Path) -> None:
+def recording(path: Path, size: float = 1.0) -> None:
     """A small one, in which nothing is to be found."""
     time = np.arange(0.0, 0.02, 1e-4)
     names = ("command_rad", "user_position_rad", "motor_position_rad", "current_A")
-    write_measurement(Measurement({"time_s": time, **{name: np.sin(300.0 * time) for name in names}}), path)
+    write_measurement(Measurement({"time_s": time, **{name: size * np.sin(300.0 * time) for name in names}}), path)
 
 
 def write_flights(folder: Path, count: int) -> Path:

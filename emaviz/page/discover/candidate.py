@@ -300,7 +300,7 @@ def how_known(look: Look, refining: bool) -> Html:
     """Whether the cards are as algebra ranks them, or as refits do."""
     assert look.assessment is not None
     done = len(look.assessment.refitted)
-    if look.assessment.refits is not None:
+    if look.assessment.is_refined:
         return html('<div style="{}">Ranked by refits of the most probable; the rest by algebra.</div>', _SMALL)
     if refining:
         told = f"{done} refitted, more are being refitted" if done else "the most probable are being refitted"

@@ -13,7 +13,7 @@ from ema_model.faults import FAULTS, HEALTHY, NAMES
 from ema_model.identification.run import ALGORITHMS, algorithm_title
 from ema_model.identification.search import POINTS, Landscape, Way
 from ema_model.identification.uncertainty import Suggestion
-from ema_model.identification.words import CORRECTED, way_sentences
+from ema_model.identification.words import CORRECTED, landscape_words, way_sentences
 from emaviz.figures import identification
 from emaviz.figures.identification import LiveConvergence, LiveFit, Row, colour, fault_bars, table
 from emaviz.page.identify import WORKSPACE
@@ -23,7 +23,7 @@ from emaviz.page.tab import Standing
 from emaviz.page.window_layout import COLUMNS, NEXT_COLUMN
 from emaviz.page.workspaces import Page
 from emaviz.scene.playback import PLAYED, motion
-from emaviz.session.identify import Frame, Landscapes, Race, Track, ends
+from emaviz.session.identify import Frame, Race, Track, ends
 from emaviz.session.jobs import Worker
 from emaviz.text.html import Html, add_html, begin, joined, note, waiting
 from emaviz.text.results import sure_words
@@ -153,7 +153,7 @@ class LandscapeView:
     """Its controls, the map and what it says.  Figures are drawn on the slow screen's thread."""
 
     def __init__(self, page: Page, slow: Worker) -> None:
-        self._page, self._landscapes = page, Landscapes(page.session.worker)
+        self._page, self._slow, self._landscapes = page, slow, page.session.identifying.landscapes
         self._race: Race | None = None
         self._by_hand = False  # which two k
         self._plot: Any = None
@@ -198,6 +198,11 @@ class LandscapeView:
             x, y = telling(best.k if race.truth is None else race.truth)
             self._x.value, self._y.value = _NAMES[x], _NAMES[y]
         self._line.say(f"{POINTS} × {POINTS} simulations, the other six k held.")
+        if (drawn := race.landscape) is not None:
+            self._x.value, self._y.value = _NAMES[drawn.x], _NAMES[drawn.y]
+            self._line.say(landscape_words(drawn))
+            self._slow.post("landscape", lambda: self._draw_map(race, drawn))
+            self._say_ways(race, race.ways)
 
     def _show_controls(self, shown: bool) -> None:
         """Of the landscape of an answer; before there is one, how to get there."""
@@ -351,14 +356,18 @@ class IdentifyResult:
             self._draw(self._race, soon=True)
             self._slow.post("answer", self._draw_answer)
 
-    def finished(self, race: Race) -> None:
-        """The race is over: its last picture, and its rows in the table."""
+    def brought(self, race: Race) -> None:
+        """One of a session, as it was: its last picture, its answer, and its landscape."""
         self._draw(race, soon=True)
         self._slow.post("answer", self._draw_answer)
         self._landscape.answered(race)
         best = race.best
         if best is not None and best.k is not None and all(name in race.measurement for name in PLAYED):
             self._strip.put(motion(race.measurement, _seen(best), self._page.session.actuator), WORKSPACE.name)
+
+    def finished(self, race: Race) -> None:
+        """The race is over: the same, and its rows in the table."""
+        self.brought(race)
         self._page.workspaces.bring_forward(WORKSPACE.name, _SEARCH, _ANSWER)
         performance = race.performance()
         number = 1 + max((row.race for row in self.rows), default=0)

@@ -12,7 +12,7 @@ import viser
 from ema_model.errors import InputError, quoted
 from ema_model.faults import vector
 from ema_model.identification.run import ALGORITHMS
-from ema_model.identification.words import facts, verdict, why_best
+from ema_model.identification.words import facts, in_one_line, verdict, why_best
 from ema_model.recordings import write_measurement
 from ema_model.simulation.plant import FITNESSES
 from emaviz.figures.identification import Row, named
@@ -116,6 +116,7 @@ class IdentifyPanel:
         identifying, post = page.session.identifying, page.screen.post
         identifying.progressed.connect(self._progressed)
         identifying.identified.connect(lambda race: post("identification", lambda: self._draw_answer(race)))
+        identifying.brought.connect(lambda race: post("identification", lambda: self._draw_answer(race, brought=True)))
         identifying.job.began.connect(lambda _: post("search began", self._began))
         identifying.job.rests.connect(lambda _: post("search rests", result.draw))
         identifying.job.ended.connect(lambda _: post("search ended", self._ended))
@@ -214,7 +215,7 @@ class IdentifyPanel:
         self._race = race
         self._text.content = explained(joined(lines))
 
-    def _draw_answer(self, race: Race) -> None:
+    def _draw_answer(self, race: Race, *, brought: bool = False) -> None:
         best = race.best
         lines = []
         for answer in race.answers:
@@ -227,7 +228,11 @@ class IdentifyPanel:
         self._text.content = explained(joined(lines))
         self._race = race
         self._missing.visible = best is not None and best.answer is not None and not best.answer.uncertainty.adequate
-        self._result.finished(race)
+        if brought:
+            self._line.say(in_one_line(best.answer) if best is not None and best.answer is not None else "")
+            self._result.brought(race)
+        else:
+            self._result.finished(race)
         if race.path is not None:
             self._link.content = recording_link(self._viewer, race.path, "Open this run in Rerun ↗")
 

@@ -33,10 +33,10 @@ from ema_model.files.written import whole_file
 from ema_model.quantities.titles import in_sentence
 from emaviz.session.compare import Comparing
 from emaviz.session.data_folder import DataFolder
-from emaviz.session.discover.history import Entries, Entry, SavedStories, Shown, Telling, undecided
+from emaviz.session.discover.history import Entries, Entry, Shown, Telling, undecided
 from emaviz.session.discover.source import NOTHING, DiscoverySource, Sealing
 from emaviz.session.explore import Session
-from emaviz.session.inputs import Provenance
+from emaviz.session.inputs import Inputs, Provenance
 from emaviz.session.jobs import Job, Signal, Tell, Worker, aside
 
 Array = NDArray[np.float64]
@@ -181,12 +181,12 @@ class Discovering:
         self.source = DiscoverySource(comparing)
         self.sealing = Sealing(session, comparing.folder)
         self.job = Job(session.worker, on_stop=self._stopped, on_divergence="the model stays as it was")
-        self.provenance = Provenance("the discovery", "Start", self.source.inputs, self.job)
+        reading = comparing.asking
+        self.provenance = Provenance(
+            "the discovery", "Start", self.source.inputs, self.job, reads=lambda: bool(reading.reading)
+        )
         self.entries = Entries(self.source)
         self._shown = Shown(self.source, self.entries, self.events.looked)
-        self._stories = SavedStories(
-            self.job, self.source, self.entries, self._shown, lambda: comparing.opened, self.provenance
-        )
         self.job.began.connect(lambda _: self._shown.rest())
         self._own = OwnPreview()
         self._files = Worker("emaviz-discovery-files", comparing.on_error)
@@ -227,11 +227,11 @@ class Discovering:
         if entry is self.entries.current:
             return
         self._leave()
-        if entry.told is None:
-            self._take_again(entry)
-            return
         self.source.recall(entry.recipe, entry.challenge, entry.revealed)
-        self.provenance.take(entry.inputs)
+        if entry.told is None:
+            self.provenance.lose(entry.inputs or Inputs(entry.subject), entry.lost)
+        else:
+            self.provenance.take(entry.inputs)
         self._shown.recall(entry)
 
     def _leave(self) -> None:
@@ -239,7 +239,6 @@ class Discovering:
             raise InputError("a step is running; stop it first")
         self.job.stop()  # one that waits to begin
         self._shown.leave()
-        self._stories.forget()
         self.provenance.clear()
 
     # --- steps ------------------------------------------------------------------------------------------------------
@@ -265,23 +264,13 @@ class Discovering:
         return self.is_of_compare or self.start()
 
     def start(self) -> bool:
-        """Calibrates the model, and looks for what may be missing; False while another long run goes on.
-
-        Of a discovery of a session's file whose steps were not all taken again, they are.
-        """
-        if (unfinished := self._stories.unfinished) is not None:
-            if not self.job.waiting:
-                if self.session.worker.busy:
-                    return False
-                self._take_again(unfinished)
-            return True
+        """Calibrates the model, and looks for what may be missing; False while another long run goes on."""
         if not self.source.ready:
             raise InputError(NOTHING)
         inputs, compared = self.source.inputs(), self.source.finished
 
         def job(tell: Tell) -> None:
             told = self._shown.begin(self.source.recipe(), tell, compared)
-            self._stories.forget()
             if self.entries.current is not None:
                 self.entries.current.inputs = inputs
             self.provenance.take(inputs)
@@ -395,19 +384,30 @@ class Discovering:
                 if self._shown.is_behind:
                     self._shown.show(told)  # a step further: the ladder grows
 
+            told.rounds.begin(told.story)
             search(told.story, say, rounds=told.rounds, refits=told.refits)
             self._shown.assess(told, tell)
 
         return self.job.begin("Finding all that is missing", job)
 
     def undo(self) -> None:
-        """The last step back, at once."""
+        """The last step back: at once, but for what has to be looked at again."""
         told, _ = self._seen()
-        if not told.story.undo():
+        if len(told.story.steps) < 2:
             raise InputError("there is no step to take back")
-        self._shown.show(told)
-        if not told.is_assessed:  # of a walk that went on at once
-            self.job.begin("Looking again", lambda tell: self._shown.assess(told, tell))
+        if told.story.undo_is_at_once:
+            told.story.undo()
+            self._shown.show(told)
+            if not told.is_assessed:  # of a walk that went on at once
+                self.job.begin("Looking again", lambda tell: self._shown.assess(told, tell))
+            return
+
+        def job(tell: Tell) -> None:
+            tell("measuring the error without the fault")
+            told.story.undo()
+            self._shown.assess(told, tell)
+
+        self.job.begin("Taking the step back", job)
 
     @property
     def experiment(self) -> Experiment | None:
@@ -458,24 +458,20 @@ class Discovering:
             raise InputError("a step is running; wait for it, or stop it")
         if self.look is None or self._shown.told is None:
             raise InputError("there is no calibrated model yet; press Start")
-        if self._stories.unfinished is not None:  # one goes on from the steps that were taken
-            self._stories.forget()
-            self.provenance.take(self.source.inputs())
         return self._shown.told, self.look
 
     # --- a session --------------------------------------------------------------------------------------------------
 
     def saved(self) -> dict[str, Any] | None:
-        """Every discovery, in what JSON can hold; None without one."""
-        saved = self._stories.saved()
-        return None if saved is None else saved.saved()
+        """Every discovery with its story: plain values and arrays; None without one."""
+        return self.entries.saved()
 
     def files(self) -> list[str]:
-        """Names in the data folder of what the saved stories are of."""
-        return self._stories.files()
+        """Names in the data folder of what they are of."""
+        return [name for one in self.entries.all for name in one.recipe.files]
 
     def restore(self, saved: Any, names: Mapping[str, str]) -> None:
-        """Takes the steps of a session's story again, once no other long run goes on; InputError if it is none.
+        """Takes the discoveries of a session, and shows one as it was left; InputError for what makes no sense.
 
         names: the files' names of now by those of then.
         """
@@ -483,13 +479,9 @@ class Discovering:
             raise InputError("a step of Discover is running; stop it, and load the session again")
         if saved is None:
             return self.choose("")
-        entry = self._stories.bring(saved, names)
+        entry = self.entries.bring(saved, names)
         self._leave()
-        self._take_again(entry)
-
-    def _take_again(self, entry: Entry) -> None:
-        self._stories.take_again(entry)
-        self.events.looked(None)
+        self.show(entry)
 
     # --- what stays -------------------------------------------------------------------------------------------------
 

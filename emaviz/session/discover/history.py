@@ -1,18 +1,16 @@
-"""Discoveries as they went: their steps, what of them is shown, and what a session saves."""
+"""Discoveries as they went: their steps, what of them is shown, and what a session stores."""
 
 from __future__ import annotations
 
-import time
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from datetime import datetime
-from itertools import pairwise
 from typing import Any
 
 import msgspec
 import numpy as np
 
-from ema_model.actuator.write import as_toml
 from ema_model.challenges import Challenge
 from ema_model.comparison.explain import Explanation
 from ema_model.comparison.result import Comparison
@@ -23,15 +21,14 @@ from ema_model.discovery.result import Experiment
 from ema_model.discovery.rounds import Refits, Rounds
 from ema_model.discovery.snapshot import Assessment, Look, assessed, known_of, look_at, refined
 from ema_model.discovery.words import effect_title
-from ema_model.effects import CATALOGUE, catalogue_name
+from ema_model.effects import CATALOGUE
 from ema_model.errors import InputError
-from ema_model.estimation.model_fit import fit
-from ema_model.faults import NAMES
 from ema_model.quantities.numbers import number
 from ema_model.quantities.titles import in_sentence
-from emaviz.session.discover.source import DiscoverySource, Recipe, SavedStep, SavedStory, actuator_of, story_of
-from emaviz.session.inputs import Inputs, Provenance
-from emaviz.session.jobs import RESTED, Job, Signal, Stopped, Tell, aside
+from ema_model.result import restored, stored
+from emaviz.session.discover.source import DiscoverySource, Recipe, SavedStory, story_of
+from emaviz.session.inputs import Inputs, Room, digest
+from emaviz.session.jobs import Signal, Tell, aside
 
 # --- candidates refitted in the model of a story, each once -----------------------------------------------------------
 # Candidates refitted in the model of a story, each once; and the two between which a test would have to decide.
@@ -93,85 +90,6 @@ def undecided(story: Story, known: Mapping[Step, Assessment]) -> tuple[Story, li
     return None
 
 
-# --- a discovery's steps in what JSON can hold, and the same steps taken again from their fitted values ---------------
-
-_DAMAGED = "the session's steps of Discover are damaged; save it anew"
-
-Progress = Callable[[str], None]
-
-
-def steps_of(story: Story) -> tuple[SavedStep, ...]:
-    """Each step after the calibration."""
-    return tuple(
-        SavedStep(
-            as_toml(step.fit.actuator),
-            dict(step.fit.starts),
-            tuple(step.fit.faults),
-            _rivals(story, before, step),
-        )
-        for before, step in pairwise(story.steps)
-    )
-
-
-def take_again(story: Story, steps: Sequence[SavedStep], tell: Progress, shown: Callable[[], None]) -> None:
-    """Takes saved steps after the calibration; each fit begins where it ended then.  shown() follows each step.
-
-    Raises InputError for steps that make no sense, with the steps before them taken.
-    """
-    for i, one in enumerate(steps, 1):
-        tell(f"step {i} of {len(steps)}")
-        _take(story, one, lambda text, i=i: tell(f"step {i} of {len(steps)}: {text}"))
-        shown()
-
-
-def _take(story: Story, saved: SavedStep, tell: Progress) -> None:
-    model, before = actuator_of(saved.model), story.current.actuator
-    own = {path: one for path, one in model.tolerances.items() if path.startswith("effects.")}
-    others = {path: one for path, one in before.tolerances.items() if not path.startswith("effects.")}
-    found = fit(
-        story.data,
-        replace(before, effects=model.effects, tolerances={**others, **own}),
-        saved.starts,
-        tell,
-        saved.faults,
-    )
-    more = tuple(name for name in found.faults if name not in story.current.faults)
-    less = [name for name in story.current.faults if name not in found.faults]
-    rivals = [one for one in saved.same_as if one in (*CATALOGUE, *NAMES) and one not in model.effects]
-    new = [key for key in model.effects if key not in before.effects]
-    gone = [key for key in before.effects if key not in model.effects]
-    if more and not (new or gone or less):
-        story.add(Trial(Candidate(more[0], 0.0, {}), {}, found, story.current.chi2 - found.chi2, more), rivals)
-    elif less and not (new or gone or more):
-        story.remove(less[0], found)
-    elif more or less:
-        raise InputError(_DAMAGED)
-    elif len(gone) == 1 and not new:
-        story.remove(gone[0], found)
-    elif len(gone) == len(new) == 1:
-        story.swap(gone[0], Trial(Candidate(new[0], 0.0, {}), {new[0]: {}}, found, story.current.chi2 - found.chi2))
-    elif new and not gone:
-        effects = {key: dict(model.effects[key]) for key in new}
-        name = catalogue_name(new[0])
-        trial = Trial(Candidate(name, 0.0, effects[new[0]]), effects, found, story.current.chi2 - found.chi2)
-        check_value(trial)
-        story.add(trial, rivals)
-    else:
-        raise InputError(_DAMAGED)
-    story.finish(tell)  # as it was when it was added: the floor may be another
-
-
-def _rivals(story: Story, before: Step, step: Step) -> tuple[str, ...]:
-    """What cannot be told from that which a step adds."""
-    effects = {name for one in step.added if one.key not in _keys(before) for name in one.same_as}
-    faults = {story.ties[name] for name in step.fit.faults if name not in before.fit.faults and name in story.ties}
-    return tuple(sorted(effects | faults))
-
-
-def _keys(step: Step) -> set[str]:
-    return {one.key for one in step.added}
-
-
 # --- a story and all that belongs to it -------------------------------------------------------------------------------
 # A story and all that belongs to it: what is known of its steps, what it was made from, how it is written down.
 
@@ -185,6 +103,7 @@ class Telling:
     known: dict[Step, Assessment] = field(default_factory=dict)  # so that a step back is at once
     trials: Trials = field(default_factory=Trials)  # so that nothing is fitted twice
     rounds: Rounds = field(default_factory=Rounds)  # beside its models
+    refitted: dict[Step, Refits] = field(default_factory=dict)
     first: Sequence[Candidate] = ()  # of the first search, with what their refits gave
     experiment: Experiment | None = None
 
@@ -195,23 +114,29 @@ class Telling:
 
     def assess(self) -> None:
         """Looks at what the last model leaves; takes a second, and the first time a compilation."""
+        self.rounds.begin(self.story)
         found = self.known[self.story.steps[-1]] = assessed(self.story, self.rounds)
         self.first = self.first or found.candidates
 
     @property
-    def refits(self) -> Refits | None:
-        """Beside the last model, once they are known."""
+    def is_refined(self) -> bool:
+        """Whether the most probable candidates are refitted beside the last model."""
         known = known_of(self.story.steps[-1], self.known)
-        return known.refits if known is not None else None
+        return known is not None and known.is_refined
+
+    @property
+    def refits(self) -> Refits | None:
+        """Beside the last model, while they are kept."""
+        return known_of(self.story.steps[-1], self.refitted)
 
     def refine(self, tell: Tell, shown: Callable[[Assessment], None]) -> None:
         """Refits the most probable candidates; shown is given what is known after each few."""
         step = self.story.steps[-1]
         seen = known_of(step, self.known)
         assert seen is not None, "it is assessed before"
-        found = self.known[step] = refined(self.story, seen, self.rounds, tell, shown)
-        assert found.refits is not None
-        self.trials.take(self.story, [one.trial for one in found.refits.contenders])
+        found, refits = refined(self.story, seen, self.rounds, tell, shown)
+        self.known[step], self.refitted[step] = found, refits
+        self.trials.take(self.story, [one.trial for one in refits.contenders])
         shown(found)
 
     def add(self, trial: Trial, alike: Sequence[str], tell: Tell) -> None:
@@ -237,9 +162,51 @@ class Telling:
         known = known_of(steps[next(nameless, len(steps)) - 1], self.known)
         return known.left.explanation if known is not None else None
 
-    def saved(self) -> SavedStory:
-        """The steps, and what they were made from."""
-        return SavedStory(self.recipe, steps_of(self.story), self.experiment)
+    def forget_scores(self) -> None:
+        """What each candidate was scored and refitted with is made anew by the next step."""
+        self.trials, self.rounds, self.refitted = Trials(), Rounds(), {}
+
+    def stored(self, look: Look) -> dict[str, Any]:
+        """With its last picture; plain values and arrays.  InputError while a step changes it."""
+        story = self.story.to_store()
+        if len(story.steps) < look.steps:
+            raise InputError("a step is running; save the session once it has ended")
+        story.steps = story.steps[: look.steps]
+        known = {to: known_of(step, self.known) for step, to in zip(self.story.steps, story.steps)}
+        of_steps = {step: one for step, one in known.items() if one is not None}
+        return stored(StoredStory(story, of_steps, self.first, self.experiment, look))
+
+
+@dataclass(frozen=True, eq=False)
+class StoredStory:
+    """A story as a session's file has it: all of its steps, and what is known of each."""
+
+    story: Story
+    known: dict[Step, Assessment]
+    first: Sequence[Candidate]
+    experiment: Experiment | None
+    look: Look
+
+    @classmethod
+    def of(cls, given: Any) -> StoredStory:
+        """What `Telling.stored` gave; InputError for what is damaged, or of another version."""
+        return restored(given, cls, StoredStory._check)
+
+    def _check(self) -> None:
+        """Whatever is raised says that parts do not fit each other."""
+        look = self.look
+        _ = look.found.to_dict(), str(look.found.document), look.removable, look.primary
+        blocks = sum(one.blocks for one in look.found.plant.windows)  # which are drawn at once
+        if (
+            blocks != len(look.counts)
+            or len(look.residuals.time_s) != len(look.counts)
+            or not 0 < len(self.story.steps) == look.steps
+        ):
+            raise ValueError("parts that do not fit each other")
+
+    def told(self, recipe: Recipe) -> Telling:
+        """As it was, without what each candidate was scored with."""
+        return Telling(self.story, recipe, self.known, first=self.first, experiment=self.experiment)
 
 
 # --- all discoveries of a session -------------------------------------------------------------------------------------
@@ -250,7 +217,7 @@ _MOST_NAMES = 2  # of recordings, in an entry's words
 
 @dataclass(eq=False)
 class Entry:
-    """One discovery.  One that a session's file brought has no story until its steps are taken again."""
+    """One discovery.  One whose story is not kept, or could not be brought by a session's file, is begun anew."""
 
     number: int
     recipe: Recipe
@@ -259,15 +226,18 @@ class Entry:
     challenge: Challenge | None = None
     revealed: bool = False
     at: datetime = field(default_factory=datetime.now)
-    brought: SavedStory | None = None  # what the file says, while there is no story
     inputs: Inputs | None = None  # of the story
+    says: str = "not opened yet"  # while there is no picture
+    lost: str = ""  # why its story is not here
+    steps_digest: str = ""  # likewise, of its steps
 
     def saved(self) -> SavedStory:
-        """As a session's file has it."""
-        if self.told is None:
-            assert self.brought is not None, "it was told here, or brought"
-            return self.brought
-        return msgspec.structs.replace(self.told.saved(), revealed=self.revealed, says=self.result)
+        """As a session's file says it; the story stands beside."""
+        steps = self.steps_digest
+        if self.told is not None and self.look is not None:
+            ladder = [(one.change, one.rmse, one.holdout_rmse) for one in self.look.found.ladder]
+            steps = digest((ladder, self.told.experiment))
+        return SavedStory(self.recipe, self.revealed, self.result, self.number, self.at, self.inputs, steps)
 
     @property
     def subject(self) -> str:
@@ -282,7 +252,7 @@ class Entry:
     def result(self) -> str:
         """Steps and error: '2 added, 1.02 × floor'."""
         if self.look is None:
-            return self.brought.says[:80] if self.brought is not None else "not opened yet"
+            return self.says
         added = len(self.look.removable)
         return f"{f'{added} added' if added else 'calibrated'}, {number(self.look.rmse)} × floor"
 
@@ -292,47 +262,101 @@ class Entry:
         return f"{self.number} · {self.subject} · {self.result} · {self.at:%H:%M}"
 
 
-WHOLE = 3  # discoveries that are gone back to without computing: what each has scored takes 150 MB
+WHOLE = 3  # discoveries that go on at once: what each has scored takes 150 MB
+KEPT = 12  # that are gone back to, with all of their steps: each takes tens of MB
+_MOST_BROUGHT = 50  # by a session's file
+_MOST_TEXT = 3_500_000  # that stories are in it, beside their arrays: of fifty steps
 
 
 class Entries:
     """The discoveries, the oldest first, and which one is shown.
 
-    Those shown last are whole; of the others there is what a session's file has, and their steps are taken again.
+    Those shown last are whole; of the others nothing is missing but what each candidate was scored with.
     """
 
     def __init__(self, source: DiscoverySource) -> None:
         self._source = source
         self.all: list[Entry] = []
         self.current: Entry | None = None
-        self._whole: list[Entry] = []  # the one shown last is the last
+        self._kept: list[Entry] = []  # the one shown last is the last
 
     def begin(self, told: Telling) -> Entry:
-        """A new one, or the one that was brought and is taken again now, is shown."""
+        """A new one, or the one that has no story, is shown."""
         entry = self.current
         if entry is None or entry.told is not None:
             self.leave()
             entry = self._new(told.recipe)
-        entry.told, entry.look, entry.brought, entry.revealed = told, None, None, False
-        entry.challenge = self._source.challenge
+        entry.told, entry.look, entry.revealed, entry.lost = told, None, False, ""
+        entry.recipe, entry.challenge = told.recipe, self._source.challenge
         self.show(entry)
         return entry
 
     def show(self, entry: Entry) -> None:
-        """One that is whole is shown."""
+        """One is shown."""
         self.current = entry
-        self._whole = [*(one for one in self._whole if one is not entry and one.told is not None), entry]
-        for one in self._whole[:-WHOLE]:
-            one.brought = one.saved()
-            one.told = one.look = None
-        self._whole = self._whole[-WHOLE:]
+        self._keep(entry)
 
-    def bring(self, saved: SavedStory) -> Entry:
-        """One of a session's file; it may be here."""
+    def _keep(self, entry: Entry) -> None:
+        self._kept = [*(one for one in self._kept if one is not entry and one.told is not None), entry]
+        for one in self._kept[:-KEPT]:
+            one.says, one.told, one.look = one.result, None, None
+            one.lost = f"the last {KEPT} are kept"
+        self._kept = self._kept[-KEPT:]
+        for one in self._kept[:-WHOLE]:
+            if one.told is not None:
+                one.told.forget_scores()
+
+    def saved(self) -> dict[str, Any] | None:
+        """For a session's file: the one that is shown (else the last), and the rest as its others; None without one."""
+        current = self.current or (self.all[-1] if self.all else None)
+        if current is None:
+            return None
+        if current is self.current:
+            current.revealed = self._source.revealed
+        room, rest = Room(_MOST_TEXT), [one for one in reversed(self.all) if one is not current]
+        first, *others = (self._saved(one, room) for one in (current, *rest))
+        return {**first, "others": others}
+
+    def _saved(self, entry: Entry, room: Room) -> dict[str, Any]:
+        told, look = entry.told, entry.look
+        found = None
+        if told is not None and look is not None:
+            with suppress(InputError):  # there is no room for it, or a step changes it
+                found = room.take(told.stored(look))
+        return {**msgspec.to_builtins(entry.saved()), "story": found}
+
+    def bring(self, saved: Any, names: Mapping[str, str]) -> Entry:
+        """Those of a session's file; the one that is to be shown.  InputError, and none of them, if it is damaged.
+
+        names: the files' names of now by those of then.
+        """
+        told = story_of(saved)
+        given = [(told, saved), *zip(told.others, saved.get("others", ()))]
+        found = [(one.renamed(names), whole) for one, whole in given[: 1 + _MOST_BROUGHT]]
+        challenges = [self._source.challenge_of(one.recipe) for one, _ in found]
+        brought = [self._brought(one, whole.get("story"), its) for (one, whole), its in zip(found, challenges)]
+        self.all.sort(key=lambda one: one.number)
+        return brought[0]
+
+    def _brought(self, saved: SavedStory, story: Any, challenge: Challenge | None) -> Entry:
+        """One of a file; it may be here."""
         if known := next((one for one in self.all if one.saved() == saved), None):
             return known
         entry = self._new(saved.recipe)
-        entry.brought = saved
+        if saved.number and all(one.number != saved.number for one in self.all):
+            entry.number = saved.number
+        entry.challenge, entry.revealed, entry.inputs = challenge, saved.revealed, saved.inputs
+        entry.at, entry.says, entry.steps_digest = saved.at or entry.at, saved.says, saved.steps_digest
+        if story is None:
+            entry.lost = "its steps are not in this session"
+            return entry
+        try:
+            found = StoredStory.of(story)
+        except InputError as error:
+            entry.lost = str(error)
+        else:
+            entry.told, entry.look = found.told(saved.recipe), found.look
+            self._keep(entry)
         return entry
 
     def leave(self) -> None:
@@ -371,7 +395,7 @@ class Shown:
         self.told = self.look = None
 
     def recall(self, entry: Entry) -> None:
-        """A story as it was left, at once."""
+        """An entry as it was left, at once."""
         self._entries.show(entry)
         self.told, self.look = entry.told, entry.look
         self._looked(self.look)
@@ -403,7 +427,7 @@ class Shown:
     def refine(self, told: Telling, tell: Tell) -> None:
         """Refits the most probable candidates, and shows each as it comes; what they stand beside is shown before."""
         look = self.look
-        if told.refits is not None or look is None or not look.promising:
+        if told.is_refined or look is None or not look.promising:
             return
         self.is_refining = True
         self._looked(look)  # a click may follow from now on
@@ -423,104 +447,3 @@ class Shown:
         if self._entries.current is not None:
             self._entries.current.look = look
         self._looked(look)
-
-
-# --- the discoveries in a session's file: what it is given, and what it brings, taken again step by step --------------
-
-_MOST_BROUGHT = 50  # discoveries beside the shown one
-_MOST_WAIT_S = 20.0  # for measurements that may never be there
-_TITLE = "Taking the session's steps again"
-
-
-class SavedStories:
-    """Saves all entries; takes those of a file."""
-
-    def __init__(
-        self,
-        job: Job,
-        source: DiscoverySource,
-        entries: Entries,
-        shown: Shown,
-        opened: Callable[[], Collection[str]],
-        provenance: Provenance,
-    ) -> None:
-        """opened(): names of the recordings that are open on Compare."""
-        self._job, self._source, self._entries, self._shown, self._opened = job, source, entries, shown, opened
-        self._provenance = provenance
-        self._again: SavedStory | None = None  # what is being taken again, or was when it was stopped
-
-    def forget(self) -> None:
-        """What was being taken again is put away."""
-        self._again = None
-
-    @property
-    def unfinished(self) -> Entry | None:
-        """The discovery of a file whose steps are not all taken again."""
-        return self._entries.current if self._again is not None else None
-
-    def saved(self) -> SavedStory | None:
-        """Every discovery, the one that is shown (else the last) first and the rest as its others; None without one."""
-        entries = self._entries
-        current = entries.current or (entries.all[-1] if entries.all else None)
-        if current is None:
-            return self._again
-        if current is entries.current:
-            current.revealed = self._source.revealed
-        first = self._again or current.saved()
-        return msgspec.structs.replace(first, others=tuple(one.saved() for one in entries.all if one is not current))
-
-    def files(self) -> list[str]:
-        """Names in the data folder of what they are made from."""
-        saved = self.saved()
-        return [] if saved is None else [name for one in (saved, *saved.others) for name in one.recipe.files]
-
-    def bring(self, saved: Any, names: Mapping[str, str]) -> Entry:
-        """The entries of a file; returns the one that is to be shown.  InputError, and none of them, if it is damaged.
-
-        names: the files' names of now by those of then.
-        """
-        told = story_of(saved)
-        first, *others = (
-            msgspec.structs.replace(one, recipe=self._source.checked(one.recipe.renamed(names)), others=())
-            for one in (told, *told.others)
-        )
-        for one in others[:_MOST_BROUGHT]:
-            self._entries.bring(one)
-        return self._entries.bring(first)
-
-    def take_again(self, entry: Entry) -> None:
-        """The steps of one that a file brought, once nothing else runs; its fits begin where they ended then."""
-        saved, shown = entry.brought or self._again, self._shown
-        assert saved is not None, "it has no story yet"
-        self._source.take(saved.recipe)
-        shown.leave()
-        entry.told, entry.look, entry.brought = None, None, saved
-        self._entries.current, self._again = entry, saved
-
-        def job(tell: Tell) -> None:
-            inputs = self._source.inputs()
-            try:
-                told = shown.begin(saved.recipe, tell)
-                shown.assess(told, tell)  # the first step's cards are what the report ranks
-                take_again(told.story, saved.steps, tell, lambda: shown.show(told))
-            except Stopped:
-                raise  # the rest can be taken later
-            except BaseException:
-                self._again = None
-                raise
-            told.experiment, self._source.revealed = saved.experiment, saved.revealed
-            self._again, entry.inputs = None, inputs
-            self._provenance.take(inputs)
-            shown.assess(told, tell)
-            shown.refine(told, tell)
-
-        wanted, until = {*saved.recipe.fitted, *saved.recipe.held}, time.perf_counter() + _MOST_WAIT_S
-
-        def waits_for() -> str:
-            open_or_late = wanted <= {*self._opened()} or time.perf_counter() > until
-            return "" if open_or_late else "its measurements, which are being read"
-
-        def begin() -> bool:
-            return self._provenance.begin(lambda: self._job.begin(_TITLE, job))
-
-        self._job.begin_in_turn(_TITLE, begin, waits_for, RESTED)

@@ -7,6 +7,7 @@ import secrets
 import tempfile
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from datetime import datetime
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -20,10 +21,9 @@ from ema_model.actuator.write import as_toml
 from ema_model.challenges import Challenge, challenges, folder, opened, sealed_challenge
 from ema_model.challenges.challenge import SUFFIX
 from ema_model.challenges.truth import SENSORS, Truth, read_truth, seal, unseal
-from ema_model.commands import command
 from ema_model.comparison.result import Comparison
 from ema_model.discovery import Discovery
-from ema_model.discovery.result import Added, Experiment
+from ema_model.discovery.result import Added
 from ema_model.discovery.words import effect_title, fitted_of, value
 from ema_model.effects import CATALOGUE, find
 from ema_model.errors import InputError
@@ -42,10 +42,7 @@ from emaviz.session.jobs import Job, Signal, Tell
 from emaviz.session.settings import Settings, taken
 
 # --- what a session's file says of a discovery ------------------------------------------------------------------------
-# What a session's file says of a discovery: what it was made from, its steps, and the test that was suggested last.
-
-MOST_STEPS = 100
-_FARTHEST = 1e3  # σ that a fitted value may be off
+# What a session's file says of a discovery: what it was made from, and what came of it; its story stands beside.
 
 
 class Recipe(msgspec.Struct, frozen=True):
@@ -74,45 +71,26 @@ class Recipe(msgspec.Struct, frozen=True):
         return msgspec.structs.replace(self, challenge=challenge, fitted=fitted, held=held)
 
 
-class SavedStep(msgspec.Struct, frozen=True):
-    """A step after the calibration: its model, where its fit ended, the faults in it, and its rivals."""
-
-    model: str  # as an actuator's file
-    starts: dict[str, Annotated[float, msgspec.Meta(gt=-_FARTHEST, lt=_FARTHEST)]]  # σ, by path
-    faults: tuple[str, ...] = ()
-    same_as: tuple[str, ...] = ()  # effects and faults that cannot be told from the new one
-
-    def __post_init__(self) -> None:
-        if len(set(self.faults)) != len(self.faults) or not set(self.faults) <= set(NAMES):
-            raise InputError("faults are k1 … k8, each once")
-
-
 class SavedStory(msgspec.Struct, frozen=True):
     """One discovery; with the first of a session, the others."""
 
     recipe: Recipe
-    steps: Annotated[tuple[SavedStep, ...], msgspec.Meta(max_length=MOST_STEPS)]
-    experiment: Experiment | None = None
     revealed: bool = False  # the challenge's truth
-    says: str = "not opened yet"
+    says: Annotated[str, msgspec.Meta(max_length=80)] = "not opened yet"
+    number: Annotated[int, msgspec.Meta(ge=0, lt=1_000_000)] = 0
+    at: datetime | None = None
+    inputs: Inputs | None = None  # of the story
+    steps_digest: str = ""  # by which the same steps are known again
     others: tuple[SavedStory, ...] = ()
 
-    def __post_init__(self) -> None:
-        if (one := self.experiment) is not None:
-            command(one.command, one.settings)
-            for name in one.separates:
-                if name not in NAMES:
-                    find(name)
-            if not all(map(math.isfinite, (one.duration_s, one.load_torque_Nm, one.expected_chi2))):
-                raise InputError("a suggested test has finite numbers")
-
-    def saved(self) -> dict[str, Any]:
-        """In what JSON can hold."""
-        return msgspec.to_builtins(self)
+    def renamed(self, names: Mapping[str, str]) -> SavedStory:
+        """With the files' names of now, by those of then."""
+        inputs = None if self.inputs is None else self.inputs.renamed(names)
+        return msgspec.structs.replace(self, recipe=self.recipe.renamed(names), inputs=inputs, others=())
 
 
 def story_of(saved: Any) -> SavedStory:
-    """What `SavedStory.saved` gave; InputError if it makes no sense."""
+    """As it was saved; InputError if it makes no sense."""
     return taken(SavedStory, saved, "part of Discover")
 
 
@@ -370,16 +348,9 @@ class DiscoverySource:
             actuator=as_toml(replace(actuator, tolerances=freed)),
         )
 
-    def checked(self, recipe: Recipe) -> Recipe:
-        """The same; InputError for a challenge that is not there."""
-        self._challenge(recipe.challenge)
-        return recipe
-
-    def take(self, recipe: Recipe) -> None:
-        """Chooses what a recipe says."""
-        self.choose(recipe.challenge)
-        if not recipe.challenge:
-            self._comparing.take_held_out(recipe.held)
+    def challenge_of(self, recipe: Recipe) -> Challenge | None:
+        """The challenge that a recipe names, if one; InputError where it is not there."""
+        return self._challenge(recipe.challenge)
 
     def recall(self, recipe: Recipe, challenge: Challenge | None, revealed: bool) -> None:
         """Chooses again what a story was made from, without reading anything."""

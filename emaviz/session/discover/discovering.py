@@ -485,7 +485,7 @@ class Discovering:
             return self.choose("")
         entry = self._stories.bring(saved, names)
         self._leave()
-        self._take_again(entry)
+        self.show(entry)  # at once if it is here
 
     def _take_again(self, entry: Entry) -> None:
         self._stories.take_again(entry)

@@ -27,13 +27,13 @@ def remembered(of: int) -> Callable[[Callable[Values, Found]], Callable[Values, 
 
         @wraps(function)
         def asked(*values: Values.args, **named: Values.kwargs) -> Found:
-            assert not named, "it is remembered by the places of its values"
+            assert not named, "answers are remembered by the places of values"
             others = (*values[:of], *values[of + 1 :])
             answers = known.setdefault(values[of], {})
             try:
                 return answers[others]
             except KeyError:
-                found = answers[others] = function(*values)
+                found = answers[others] = function(*values, **named)
                 for oldest in list(answers)[:-_MOST]:
                     answers.pop(oldest, None)  # another thread may have done so
                 return found

@@ -85,7 +85,7 @@ def _own_noise(values: Array) -> tuple[float, bool]:
     Every model of a discovery asks it of the same recordings and of their parts.
     """
     given = np.ascontiguousarray(values, dtype=float)
-    digest = hashlib.sha256(given).digest()
+    digest = hashlib.sha256(given.data).digest()
     found = _known.get(digest)
     if found is None:
         found = _known[digest] = _found_noise(given)

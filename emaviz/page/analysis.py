@@ -5,18 +5,20 @@ A tab's own file says which analysis, and what to say before there is an answer.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from typing import Any, ClassVar
 
 import plotly.graph_objects as go
 import viser
 
+from ema_model.actuator import Actuator
 from ema_model.analyses import analyses
 from ema_model.quantities.titles import in_sentence
+from ema_model.recordings.measurement import Measurement
 from ema_model.result import Result
 from ema_model.text import Document, Lines
-from emaviz.page.panel import RECORD, REPORT, JobLine, KeepButtons, Keeps
+from emaviz.page.panel import RECORD, REPORT, Example, JobLine, KeepButtons, Keeps
 from emaviz.page.share import Place
 from emaviz.page.tab import Shared, Standing, Tab
 from emaviz.page.window_layout import COLUMNS, NEXT_COLUMN
@@ -182,13 +184,16 @@ class AnalysisTab(Tab):
     analysis: ClassVar[str]  # its name
     about: ClassVar[str]  # what it is for, above the controls
     steps: ClassVar[Sequence[str]]  # to an answer, while there is none
+    example: ClassVar[tuple[str, str]]  # its button, and what that does
+    record_example: ClassVar[Callable[[Actuator], Measurement]]  # of the standard actuator
 
     def __init__(self, shared: Shared, right: viser.PanelHandle) -> None:
         super().__init__(shared, right)
         of = analyses()[self.analysis]
         self.analysing = Analysing(of, shared.comparing, shared.files)
         self._standing = self.standing(self.analysing.provenance)
-        before = begin(f"There is no {in_sentence(of.title)} yet", self.steps)
+        shipped = Example(self.page, *self.example, self._run_example)
+        before = begin(f"There is no {in_sentence(of.title)} yet", self.steps, shipped.html)
         with right.add_tab(of.title, self.workspace.icon):
             self._standing.add(self.page.server.gui)
             self.result = AnalysisResult(self.page, self.analysing, view_for(of.result), before, shared.viewer)
@@ -196,6 +201,10 @@ class AnalysisTab(Tab):
     def build(self) -> None:
         """The options, and the run."""
         self.panel = AnalysisPanel(self, self.analysing, self.result, self._standing)
+
+    def _run_example(self) -> None:
+        record, name = type(self).record_example, f"{self.analysis}-example.parquet"
+        self.page.begins(lambda: self.analysing.begin_example(record, name), title=self.example[0])
 
     def refresh_files(self) -> None:
         """What Compare has."""

@@ -6,6 +6,7 @@ import pytest
 from support.on_page import wait_until
 
 from emaviz.page.fleet import UnitsTab
+from emaviz.page.frequency import FrequencyTab
 from emaviz.page.track import TrackTab
 
 pytestmark = pytest.mark.browser
@@ -58,6 +59,18 @@ def test_the_example_of_runs_is_an_identification_that_is_recorded(page, app):
     assert [round(float(one), 2) for one in identifying.answer.k[:2]] == [0.25, 0.7]
     page.get_by_role("button", name="Open in Rerun, here").wait_for()
     page.get_by_text("not healthy: k1, k2, k6").first.wait_for()
+
+
+def test_the_example_of_bode_is_a_sweep_over_a_resonance(page, app):
+    analysing = app.tab(FrequencyTab).analysing
+    example(page, "Bode").click()
+    wait_until(lambda: analysing.job.running)
+    wait_until(lambda: analysing.result is not None)
+    page.get_by_text("The measured resonance lies at 65").locator("visible=true").first.wait_for()
+    assert analysing.result.recordings == ["frequency-example"] and not analysing.provenance.line("")
+    app.comparing.job.stop()
+    wait_until(lambda: not app.session.worker.busy)
+    app.comparing.remove(*app.comparing.opened)
 
 
 def test_the_example_of_compare_holds_one_out(page, app):

@@ -23,10 +23,11 @@ from support.browser import SOFTWARE_GL
 from support.on_page import choose, field, fill, wait_until
 
 from ema_model.faults import vector
-from emaviz.cli import main as emaviz
 from emaviz.page.app import App
 from emaviz.page.fleet import UnitsTab
 from emaviz.page.frequency import FrequencyTab
+from emaviz.page.identify.tab import IdentifyTab
+from emaviz.page.runs import RunsTab
 from emaviz.page.track import TrackTab
 
 WINDOWS = {1400: 900, 1920: 1080, 1100: 700}
@@ -34,6 +35,7 @@ SETTLED_MS = 1800
 LONG_MS = 900_000
 EXAMPLES = Path(__file__).parents[2] / "assets" / "examples"
 MOVES = ("running",)  # states that change by themselves
+BROKEN = "time_s,current_A\n0,1\n0,2\nabc,3\n"
 CLOSE = ".mantine-Notification-closeButton"
 
 
@@ -50,7 +52,7 @@ def explore(page: Any, app: App, _: Path) -> Iterator[str]:
     yield "result"
 
 
-def identify(page: Any, app: App, _: Path) -> Iterator[str]:
+def identify(page: Any, app: App, folder: Path) -> Iterator[str]:
     """What Explore breaks."""
     yield "empty"
     app.session.settings.set("k", list(vector({"k1": 0.25, "k2": 0.7, "k3": 0.3, "k6": 0.5})))
@@ -61,13 +63,19 @@ def identify(page: Any, app: App, _: Path) -> Iterator[str]:
     yield "running"
     page.get_by_role("link", name="in Rerun").wait_for(timeout=LONG_MS)
     yield "result"
+    (folder / "data" / "broken.csv").write_text(BROKEN)
+    app.tab(IdentifyTab).refresh_files()
+    choose(page, "Identify", "broken.csv")
+    page.get_by_role("button", name="Identify", exact=True).click()
+    page.wait_for_timeout(2000)
+    yield "error"
 
 
 def compare(page: Any, app: App, folder: Path) -> Iterator[str]:
     """A foreign file's columns, what is no recording, and the example."""
     yield "empty"
     shutil.copy(EXAMPLES / "rig.csv", folder / "data" / "rig.csv")
-    (folder / "data" / "broken.csv").write_text("time_s,current_A\n0,1\n0,2\nabc,3\n")
+    (folder / "data" / "broken.csv").write_text(BROKEN)
     app.comparing.add("broken.csv")
     page.wait_for_timeout(2000)
     yield "error"
@@ -92,6 +100,9 @@ def discover(page: Any, app: App, _: Path) -> Iterator[str]:
     """A challenge, from its candidates to its ladder."""
     told = app.discovering
     yield "empty"
+    page.get_by_role("button", name="Start", exact=True).click()
+    page.wait_for_timeout(2000)
+    yield "error"
     page.get_by_label("Measurements", exact=True).click()
     page.get_by_role("option", name="After the overhaul").click()
     page.get_by_role("button", name="Start", exact=True).click()
@@ -134,10 +145,19 @@ def units(page: Any, app: App, _: Path) -> Iterator[str]:
     yield "error"
 
 
-def track(page: Any, app: App, _: Path) -> Iterator[str]:
+def track(page: Any, app: App, folder: Path) -> Iterator[str]:
     """A life."""
     job = app.tab(TrackTab).following.job
     yield "empty"
+    flights = folder / "data" / "flights"
+    flights.mkdir()
+    for day in (1, 2, 3):
+        (flights / f"flight {day}.csv").write_text(BROKEN)
+    app.tab(TrackTab).refresh_files()
+    choose(page, "Flights", "flights (3)")
+    page.get_by_role("button", name="Track", exact=True).click()
+    page.wait_for_timeout(4000)
+    yield "error"
     page.locator("button:visible", has_text="Run an example").click()
     wait_until(lambda: job.running)
     page.wait_for_timeout(30_000)
@@ -146,24 +166,18 @@ def track(page: Any, app: App, _: Path) -> Iterator[str]:
     yield "result"
 
 
-def bode(page: Any, app: App, folder: Path) -> Iterator[str]:
+def bode(page: Any, app: App, _: Path) -> Iterator[str]:
     """A sweep over a resonance."""
     yield "empty"
     page.get_by_role("button", name="Frequency response").click()
     page.get_by_text("no measurement is chosen").first.wait_for()
     yield "error"
-    sweep = "simulate --command chirp --set end_Hz=100 --set end_time_s=6 --set amplitude_rad=0.002 --duration 6"
-    effect = "--noise-current 0.1 --effect torsional_compliance --out"
-    emaviz([*sweep.split(), *effect.split(), str(folder / "data" / "sweep.csv")])
-    app.comparing.add("sweep.csv")
-    wait_until(lambda: "sweep.csv" in app.comparing.opened)
-    app.comparing.job.stop()
-    job = app.tab(FrequencyTab).analysing.job
-    wait_until(lambda: not app.session.worker.busy)
-    page.get_by_role("button", name="Frequency response").click()
-    wait_until(lambda: job.running)
+    analysing = app.tab(FrequencyTab).analysing
+    page.locator("button:visible", has_text="Run an example").click()
+    wait_until(lambda: analysing.job.running)
     yield "running"
-    wait_until(lambda: not job.running)
+    wait_until(lambda: analysing.result is not None)
+    page.wait_for_timeout(2000)
     yield "result"
 
 
@@ -175,9 +189,15 @@ def library(page: Any, app: App, _: Path) -> Iterator[str]:
     yield "result"
 
 
-def runs(page: Any, app: App, _: Path) -> Iterator[str]:
+def runs(page: Any, app: App, folder: Path) -> Iterator[str]:
     """A run that is recorded, the viewer, and a campaign."""
     yield "empty"
+    (folder / "data" / "sessions" / "damaged.emaviz").write_text(BROKEN)
+    app.tab(RunsTab).refresh_files()
+    page.wait_for_timeout(1000)
+    page.get_by_role("button", name="Load session").click()
+    page.wait_for_timeout(2000)
+    yield "error"
     page.locator("button:visible", has_text="Run an example").click()
     identifying = app.session.identifying
     wait_until(lambda: identifying.job.running)

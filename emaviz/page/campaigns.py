@@ -12,7 +12,9 @@ import viser
 
 from ema_model.campaign.result import Campaign
 from ema_model.campaign.store import Store, summaries
+from ema_model.discovery.result import effect_title
 from ema_model.errors import InputError
+from ema_model.quantities.variables import explanation_title
 from ema_model.recordings import Measurement
 from emaviz.figures.campaign import counted
 from emaviz.page.panel import JobLine
@@ -24,7 +26,7 @@ from emaviz.session.campaigns import REPORT, Campaigns, Computing
 from emaviz.session.inputs import Provenance
 from emaviz.session.jobs import Worker
 from emaviz.text.html import Html, add_html, begin, html, joined, said
-from emaviz.views.campaign import answers, errors_drawn
+from emaviz.views.campaign import answers, errors_drawn, in_words
 
 # --- campaigns, below the recordings: which one, its progress, and the row that opens as a run ------------------------
 
@@ -258,7 +260,7 @@ def progress_bars(store: Store) -> Html:
             '<tr><td>{}</td><td style="width:220px;vertical-align:middle">'
             '<div class="emaviz-job-share" style="width:200px"><i style="width:{:.1f}%"></i></div></td>'
             "<td>{} of {}{}</td></tr>",
-            group,
+            in_words(group),
             100.0 * one["rows"] / max(one["tasks"], 1),
             one["rows"],
             one["tasks"],
@@ -275,14 +277,16 @@ def label(row: Mapping[str, Any], number: int) -> str:
     if row["error"] is not None:
         told = "error"
     elif "verdict" in row:
-        told = " + ".join(row["effects"] or ()) or row["verdict"] or "not showable"
+        told = " + ".join(map(effect_title, row["effects"] or ())) or in_words(row["verdict"] or "not showable")
     elif "error_wrapped_percent" in row:
         error = row["error_wrapped_percent"]
         told = f"rmse {row['rmse_A']:.3f} A" if error is None else f"Err {error:.2f} %"
     elif "adequate" not in row:  # what it found is in the tables
         told = ""
     else:
-        told = "adequate" if row["adequate"] else str(row["variable"] or "not adequate")
+        told = (
+            "adequate" if row["adequate"] else f"not adequate: {explanation_title(row['variable'], row['modulator'])}"
+        )
     return " · ".join(filter(None, (f"{number}", told, row["case"], f"seed {row['seed']}")))
 
 

@@ -13,6 +13,8 @@ from ema_model import faults
 from ema_model.campaign.kinds import benchmark
 from ema_model.campaign.result import Campaign, made_with
 from ema_model.campaign.store import failed, summaries
+from ema_model.discovery.result import effect_title
+from ema_model.quantities.variables import explanation_title
 from emaviz.figures import campaign
 from emaviz.text.results import Meaning
 from emaviz.views import Columns, Line, Piece, Row, Section, View
@@ -27,6 +29,11 @@ _MOST_WORKERS = 8  # that are drawn
 def pairs(figures: list[go.Figure], height_px: int) -> Iterator[Row]:
     """Two and two beside each other."""
     return (Row(figures[at : at + 2], height_px) for at in range(0, len(figures), 2))
+
+
+def in_words(name: str) -> str:
+    """'nothing hidden step' of a plan's 'nothing_hidden_step'."""
+    return name.replace("_", " ")
 
 
 def tasks(result: Campaign) -> Iterator[Piece]:
@@ -50,14 +57,14 @@ def _distributions(result: Campaign) -> Iterator[Piece]:
     yield Row([errors_drawn(known)], 360)
     drawn = []
     for i, fault in enumerate(faults.FAULTS):
-        off = {group: [_off(row, i) for row in rows] for group, rows in known.items()}
+        off = {in_words(group): [_off(row, i) for row in rows] for group, rows in known.items()}
         drawn.append(campaign.error_distribution(f"{fault.label}: found − true", f"Δ{fault.name} [-]", off))
     yield from pairs(drawn, 280)
 
 
 def errors_drawn(known: dict[str, list[dict[str, Any]]]) -> go.Figure:
     """How Err is spread in each group."""
-    errors = {group: [row["error_wrapped_percent"] for row in rows] for group, rows in known.items()}
+    errors = {in_words(group): [row["error_wrapped_percent"] for row in rows] for group, rows in known.items()}
     return campaign.error_distribution("Error of the identified k", "Err [%]", errors)
 
 
@@ -84,7 +91,7 @@ def answers(result: Campaign) -> dict[str, dict[str, Counter[str]]]:
         told = [(row, one) for row, one in rows if one is not None]
         often = {one for one, _ in Counter(one for _, one in told).most_common(_MOST_ANSWERS)}
         for row, one in told:
-            case = " · ".join(filter(None, (row["group"], row["case"])))
+            case = " · ".join(filter(None, (in_words(row["group"]), row["case"])))
             found.setdefault(title, {}).setdefault(case, Counter())[one if one in often else "another"] += 1
     return found
 
@@ -92,11 +99,11 @@ def answers(result: Campaign) -> dict[str, dict[str, Counter[str]]]:
 def _named(row: dict[str, Any]) -> str | None:
     if row["verdict"] is None:
         return None
-    return " + ".join(row["effects"]) or row["verdict"]
+    return " + ".join(map(effect_title, row["effects"])) or in_words(row["verdict"])
 
 
 def _explained(row: dict[str, Any]) -> str:
-    return f"{row['variable']} × {row['modulator']}" if row["variable"] else "nothing"
+    return explanation_title(row["variable"], row["modulator"])
 
 
 def _benchmarks(result: Campaign) -> Iterator[Piece]:
@@ -165,7 +172,7 @@ def effort(result: Campaign) -> Iterator[Piece]:
     seconds: dict[str, list[float]] = {}
     memory: dict[str, tuple[list[float], list[float]]] = {}
     for row in rows:
-        seconds.setdefault(row["group"], []).append(row["elapsed_s"])
+        seconds.setdefault(in_words(row["group"]), []).append(row["elapsed_s"])
         if row["memory_MB"] is not None:
             minutes, megabytes = memory.setdefault(row["worker"], ([], []))
             minutes.append((row["finished_s"] - rows[0]["finished_s"]) / 60.0)

@@ -114,7 +114,9 @@ def test_what_the_list_says_of_a_row(data):
     assert label(row, 1) == f"1 · Err {row['error_wrapped_percent']:.2f} % · k1=0.3 · seed 4"
     assert label(row | {"error": "broken"}, 2) == "2 · error · k1=0.3 · seed 4"
     (row,) = store.table("compare").to_pylist()
-    assert label(row | {"adequate": False, "variable": "load"}, 1) == "1 · load · seed 1"
+    by_speed = {"adequate": False, "variable": "motor_speed", "modulator": "sign_speed"}
+    assert label(row | by_speed, 1) == "1 · Motor speed × direction · seed 1"
+    assert label(row | by_speed | {"variable": None}, 1) == "1 · not adequate · seed 1"
     shown = tables(store)
     assert "A worn one" in progress_bars(store) and "1 of 1" in progress_bars(store)
     assert [figure.layout.title.text for figure in figures(store)] == [

@@ -26,7 +26,7 @@ from emaviz.page.workspaces import Page
 from emaviz.recording.viewer import ViewerHost
 from emaviz.session.analysis import Analysing
 from emaviz.session.session_file import Part
-from emaviz.text.html import BOX, add_html, begin, html, note
+from emaviz.text.html import BOX, add_html, begin, html, note, waiting
 from emaviz.text.results import large, whole
 from emaviz.views import ANSWER, Figures, Section, View, Words, view_for
 
@@ -39,10 +39,17 @@ class AnalysisResult:
     """The panel on the right.  Everything here is built and changed on the screen's thread."""
 
     def __init__(
-        self, page: Page, analysing: Analysing, view: View[Any], before: str, viewer: ViewerHost | None
+        self,
+        page: Page,
+        analysing: Analysing,
+        view: View[Any],
+        before: str,
+        meanwhile: str,
+        viewer: ViewerHost | None,
     ) -> None:
-        """before: HTML that stands there while there is no answer."""
-        self._page, self._view, self._before = page, view, before
+        """before: HTML that stands there while there is no answer; meanwhile: what is said while it is computed."""
+        self._page, self._analysing, self._view, self._before = page, analysing, view, before
+        self._meanwhile = meanwhile
         gui = page.server.gui
         add_html(gui, COLUMNS)
         self._told = add_html(gui, before)
@@ -53,6 +60,11 @@ class AnalysisResult:
         self._save = gui.add_folder("Keep it", visible=False)
         with self._save:
             self._keep = AnalysisKeep(page, analysing, viewer)
+
+    def busy(self, busy: bool) -> None:
+        """Whether a run goes on: where there is no answer yet, it is said that it does."""
+        if self._analysing.result is None:
+            self._told.content = waiting(self._analysing.job.title, self._meanwhile) if busy else self._before
 
     def show(self, result: Result | None) -> None:
         """An answer; None for none."""
@@ -176,6 +188,7 @@ class AnalysisPanel:
         with self._page.server.atomic():
             for control in (self._start, *self._options.values()):
                 control.disabled = busy
+            self._result.busy(busy)
 
 
 class AnalysisTab(Tab):
@@ -184,6 +197,7 @@ class AnalysisTab(Tab):
     analysis: ClassVar[str]  # its name
     about: ClassVar[str]  # what it is for, above the controls
     steps: ClassVar[Sequence[str]]  # to an answer, while there is none
+    meanwhile: ClassVar[str]  # what is done while it runs
     example: ClassVar[tuple[str, str]]  # its button, and what that does
     record_example: ClassVar[Callable[[Actuator], Measurement]]  # of the standard actuator
 
@@ -196,7 +210,9 @@ class AnalysisTab(Tab):
         before = begin(f"There is no {in_sentence(of.title)} yet", self.steps, shipped.html)
         with right.add_tab(of.title, self.workspace.icon):
             self._standing.add(self.page.server.gui)
-            self.result = AnalysisResult(self.page, self.analysing, view_for(of.result), before, shared.viewer)
+            self.result = AnalysisResult(
+                self.page, self.analysing, view_for(of.result), before, self.meanwhile, shared.viewer
+            )
 
     def build(self) -> None:
         """The options, and the run."""

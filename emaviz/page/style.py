@@ -53,7 +53,8 @@ def page() -> Html:
         "div:has(> .mantine-Slider-root) + .mantine-NumberInput-root,"
         "div:has(> * .mantine-Slider-root) > .mantine-NumberInput-root{width:3.9rem!important}"
         # five tabs of a narrow panel on the right in one line, too
-        "[data-dock-region=right] [data-dock-tab]{padding-left:9px!important;padding-right:9px!important}"
+        "[data-dock-region=right] [data-dock-tab]{padding-left:9px!important;padding-right:9px!important;"
+        "max-width:none!important}"
         "@media (max-width: 1250px){[data-dock-region=right] [data-dock-tab] > div:has(svg){display:none!important}}"
         # what is chosen from a list ends before the list's mark
         "input[aria-haspopup=listbox]{text-overflow:ellipsis!important;padding-right:1.7em!important}"

@@ -28,6 +28,7 @@ class FrequencyTab(AnalysisTab):
         Html("Press <b>Frequency response</b>: the model is simulated on what was put in."),
         "You see magnitude, phase and coherence, and read where measured and model differ beyond the scatter.",
     )
+    meanwhile = "The model is simulated on what was put in, and both responses are estimated alike."
     example = (
         "Run an example",
         "A sweep over the resonance of a shaft that twists: simulated, then analysed.",

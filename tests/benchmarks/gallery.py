@@ -57,10 +57,21 @@ def identify(page: Any, app: App, folder: Path) -> Iterator[str]:
     yield "empty"
     app.session.settings.set("k", list(vector({"k1": 0.25, "k2": 0.7, "k3": 0.3, "k6": 0.5})))
     app.session.refresh()
+    search = {"algorithms": ["do", "hba", "ssa"], "population": 400, "iterations": 2000}
+    usual = {name: getattr(app.session.settings, name) for name in search}
+    for name, value in search.items():
+        app.session.settings.set(name, value)
+    app.tab(IdentifyTab).show_settings()
     page.get_by_role("button", name="Identify", exact=True).click()
     wait_until(lambda: app.session.identifying.job.running)
     page.wait_for_timeout(1500)
     yield "running"
+    app.session.identifying.job.stop()
+    wait_until(lambda: not app.session.identifying.job.running)
+    for name, value in usual.items():
+        app.session.settings.set(name, value)
+    app.tab(IdentifyTab).show_settings()
+    page.get_by_role("button", name="Identify", exact=True).click()
     page.get_by_role("link", name="in Rerun").wait_for(timeout=LONG_MS)
     yield "result"
     (folder / "data" / "broken.csv").write_text(BROKEN)

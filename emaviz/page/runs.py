@@ -185,11 +185,11 @@ class RunsResult:
         self._opened = url, name
         url += f"&theme={'dark' if self._dark else 'light'}"
         self._frame.content = share_line(WORKSPACE.name, {"run": [name]}) + html(
-            '<div style="padding:0 10px 4px;font-size:12px;overflow-wrap:anywhere"><b>{}</b> · '
-            '<a href="{}" target="_blank" rel="noopener">in a tab of its own ↗</a></div>'
-            '<iframe class="emaviz-rerun" src="{}" title="Rerun viewer" '
-            'style="width:100%;height:calc(100vh - 205px);border:0"></iframe>',
+            '<div class="emaviz-viewer"><div><b>{}</b> · <button onclick="{}"><span>over the whole window ⤢</span>'
+            '<span>back to the page ⤡</span></button> · <a href="{}" target="_blank" rel="noopener">in a tab of its '
+            'own ↗</a></div><iframe class="emaviz-rerun" src="{}" title="Rerun viewer"></iframe></div>',
             name,
+            "this.closest('.emaviz-viewer').classList.toggle('emaviz-whole')",
             url,
             url,
         )

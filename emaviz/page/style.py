@@ -86,6 +86,13 @@ def page() -> Html:
         "line-height:20px}.emaviz-report{padding:6px 12px 0;font-size:14px}"
         ".emaviz-share a{color:inherit;text-underline-offset:2px}"
         "@media (min-width:900px){[data-dock-region=right] .emaviz-share{position:fixed;top:20px;right:34px;z-index:5}}"
+        # Rerun's viewer, in the panel or over the whole window
+        ".emaviz-viewer > div{padding:0 10px 4px;font-size:12px;overflow-wrap:anywhere}.emaviz-viewer button{"
+        "font:inherit;color:inherit;background:none;border:0;padding:0;text-decoration:underline;cursor:pointer}"
+        ".emaviz-viewer iframe{width:100%;height:calc(100vh - 205px);border:0}.emaviz-whole{position:fixed;inset:0;"
+        "z-index:300;background:var(--mantine-color-body)}.emaviz-whole > div{padding:5px 10px!important}"
+        ".emaviz-whole iframe{height:calc(100vh - 30px)}.emaviz-viewer:not(.emaviz-whole) button span:last-child,"
+        ".emaviz-whole button span:first-child{display:none}"
         "</style>"
     )
     return rules + _strip() + _jobs() + window_layout.style() + charts.style() + measure.style()

@@ -20,7 +20,7 @@ from emaviz.figures import theme
 # Each unit's parameters with their intervals, beside what the type shares: a small chart for each parameter.
 
 _TYPE = "rgba(134,142,150,0.30)"
-_SIGNS = "grey band: the type, in which all units agree; ◆: the unit differs from it"
+_SIGNS = "grey band: nine of ten units of the type; ◆: the unit differs from it"
 _COLUMNS = 3
 _HEAD_PX, _AXIS_PX = 54, 60  # of the whole, and below each chart
 _LEAST_ROW_PX, _ROW_PX, _MOST_ROW_PX = 11, 17, 40  # of a unit in it: as it can be read, easily, and with much room

@@ -31,7 +31,7 @@ from emaviz.page.runs import RunsTab
 from emaviz.page.track import TrackTab
 
 WINDOWS = {1400: 900, 1920: 1080, 1100: 700}
-SETTLED_MS = 1800
+SETTLED_MS, QUICK_MS = 1800, 250
 LONG_MS = 900_000
 EXAMPLES = Path(__file__).parents[2] / "assets" / "examples"
 MOVES = ("running",)  # states that change by themselves
@@ -98,7 +98,6 @@ def compare(page: Any, app: App, folder: Path) -> Iterator[str]:
     app.comparing.remove("rig.csv")
     page.locator("button:visible", has_text="Run an example").click()
     wait_until(lambda: app.comparing.running)
-    page.wait_for_timeout(1000)
     yield "running"
     wait_until(lambda: app.comparing.finished is not None and not app.comparing.running)
     yield "result"
@@ -237,15 +236,16 @@ TABS: dict[str, Callable[[Any, App, Path], Iterator[str]]] = {
 def photograph(page: Any, app: App, to: Path, named: str, state: str) -> None:
     """One state, in its windows and both looks."""
     for width, height in WINDOWS.items():
-        if state in MOVES and width != min(WINDOWS, key=lambda px: abs(px - 1400)):
+        if state in MOVES and width != 1400:
             continue
         page.set_viewport_size({"width": width, "height": height})
-        page.wait_for_timeout(SETTLED_MS)
+        settled = QUICK_MS if state in MOVES else SETTLED_MS
+        page.wait_for_timeout(settled)
         page.evaluate(f"document.querySelectorAll('{CLOSE}').forEach(one => one.click())")
         for dark in (False, True):
             app.strip._dark.value = dark
             page.mouse.move(width // 2, 5)
-            page.wait_for_timeout(SETTLED_MS)
+            page.wait_for_timeout(settled)
             page.screenshot(path=to / f"{named}-{state}-{width}-{'dark' if dark else 'light'}.png")
     app.strip._dark.value = False
     page.set_viewport_size({"width": 1400, "height": 900})

@@ -82,11 +82,11 @@ class SessionControls:
         self._load.on_click(lambda _: self._load_named(str(self._choice.value)))
         self.refresh()
 
-    def refresh(self) -> None:
-        """Reads the folder's list again."""
-        names = self._comparing.folder.session_files()
+    def refresh(self, newest: bool = True) -> None:
+        """Reads the folder's list again; newest: chooses that one, and not what is chosen as long as it is there."""
+        names, chosen = self._comparing.folder.session_files(), str(self._choice.value)
         self._choice.options = names or [_NONE]
-        self._choice.value = (names or [_NONE])[0]
+        self._choice.value = chosen if chosen in names and not newest else (names or [_NONE])[0]
         self._load.disabled = not names
 
     def uploaded(self, path: Path) -> None:
@@ -594,7 +594,8 @@ class RunsTab(Tab):
         self.shared.files.post("follow", lambda: self.panel.follow(url, name))
 
     def refresh_files(self) -> None:
-        """Plans that may be computed."""
+        """Sessions that may be loaded, and plans that may be computed."""
+        self.sessions.refresh(newest=False)
         self.campaigns.starts.refresh()
 
     def takes(self) -> dict[str, Callable[[Path], None]]:

@@ -2,25 +2,31 @@
 
 from __future__ import annotations
 
+import re
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from typing import Any
 
 import numpy as np
 import plotly.graph_objects as go
 
 from ema_model import faults
+from ema_model.actuator.parameters import on_axes
 from ema_model.campaign.kinds import benchmark
 from ema_model.campaign.result import Campaign, made_with
 from ema_model.campaign.store import failed, summaries
 from ema_model.discovery.result import effect_title
+from ema_model.effects import CATALOGUE
+from ema_model.quantities.axes import ROTARY
+from ema_model.quantities.numbers import amount
+from ema_model.quantities.titles import in_sentence
 from ema_model.quantities.variables import explanation_title
 from emaviz.figures import campaign
 from emaviz.text.results import Meaning
 from emaviz.views import Columns, Line, Piece, Row, Section, View
 
 _LEAST = 3  # identifications of a group whose spread is drawn
-_MOST_ANSWERS = 8
+_MOST_ANSWERS, _ANOTHER = 8, "another"
 _ROW_PX = 24
 _MOST_ERRORS = 200  # that are listed
 _MOST_WORKERS = 8  # that are drawn
@@ -34,6 +40,26 @@ def pairs(figures: list[go.Figure], height_px: int) -> Iterator[Row]:
 def in_words(name: str) -> str:
     """'nothing hidden step' of a plan's 'nothing_hidden_step'."""
     return name.replace("_", " ")
+
+
+def case_in_words(group: str, case: str) -> str:
+    """'cogging torque 24.0 mN·m' of the group 'cogging_torque' and its case 'cogging_torque 0.024'."""
+    told, of = _VALUE.sub(_value_in_words, case), in_words(group)
+    return told if of in told.replace("-", " ") else " · ".join(filter(None, (of, told)))
+
+
+_VALUE = re.compile(r"\b([a-z]\w*(?:\.\w+)?)([ +=])(-?\d[\d.]*(?:e[+-]?\d+)?)")  # a name and a number in a case
+
+
+def _value_in_words(told: re.Match[str]) -> str:
+    """An effect with its first parameter's value, or a parameter of the actuator; others as they are."""
+    name, sign, value = told.groups()
+    path = f"effects.{name}.{CATALOGUE[name].parameters[0].name}" if name in CATALOGUE else name
+    named = on_axes(path, ROTARY)
+    if "." not in path or named.title == path:
+        return told.group()
+    title = CATALOGUE[name].title if name in CATALOGUE else named.title
+    return f"{in_sentence(title)} {sign.strip('= ')}{amount(float(value), named.unit)}"
 
 
 def tasks(result: Campaign) -> Iterator[Piece]:
@@ -77,7 +103,12 @@ def _off(row: dict, i: int) -> float:
 def _answers(result: Campaign) -> Iterator[Piece]:
     """Bars, a row a case, of discoveries and comparisons."""
     for title, counts in answers(result).items():
-        yield Row([campaign.counted(title, counts)], 130 + _ROW_PX * len(counts))
+        yield Row([campaign.counted(title, counts)], counted_px(counts))
+
+
+def counted_px(counts: Mapping[str, object]) -> int:
+    """How high such bars are, so that each case has its name."""
+    return 130 + _ROW_PX * len(counts)
 
 
 def answers(result: Campaign) -> dict[str, dict[str, Counter[str]]]:
@@ -87,12 +118,14 @@ def answers(result: Campaign) -> dict[str, dict[str, Counter[str]]]:
         ("discover", "What was named", _named),
         ("compare", "What explains the residual first", _explained),
     ):
-        rows = [(row, answer(row)) for row in result.answers(kind)]
+        place = {group: at for at, group in enumerate(result.progress)}  # in the plan's order, not as they ended
+        ordered = sorted(result.answers(kind), key=lambda row: (place.get(row["group"], 0), row["case"]))
+        rows = [(row, answer(row)) for row in ordered]
         told = [(row, one) for row, one in rows if one is not None]
         often = {one for one, _ in Counter(one for _, one in told).most_common(_MOST_ANSWERS)}
         for row, one in told:
-            case = " · ".join(filter(None, (in_words(row["group"]), row["case"])))
-            found.setdefault(title, {}).setdefault(case, Counter())[one if one in often else "another"] += 1
+            case = case_in_words(row["group"], row["case"])
+            found.setdefault(title, {}).setdefault(case, Counter())[one if one in often else _ANOTHER] += 1
     return found
 
 

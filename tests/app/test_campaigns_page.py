@@ -20,6 +20,7 @@ from emaviz.recording import read
 from emaviz.session.campaigns import Campaigns
 from emaviz.session.data_folder import DataFolder
 from emaviz.session.explore import Session
+from emaviz.views.campaign import case_in_words
 
 GROUPS = """
 [groups.worn]
@@ -108,6 +109,21 @@ def test_a_row_opens_as_a_run_with_its_recording(session, data, kind):
         campaigns.open_row("campaigns/first", "nothing")
 
 
+@pytest.mark.parametrize(
+    ("group", "case", "told"),
+    [
+        ("cogging_torque", "cogging_torque 0.024", "cogging torque 24.0 mN·m"),
+        ("load_dependent_friction", "load_dependent_friction 0.15", "load-dependent friction 0.150"),
+        ("viscous_friction", "motor.viscous_friction_Nms_rad+0.00015", "motor viscous friction +0.000150 N·m·s/rad"),
+        ("mine", "step · hinge_moment 500", "mine · step · hinge moment 500 N·m/rad"),
+        ("worn", "k1=0.3", "worn · k1=0.3"),
+        ("nothing_hidden_step", "", "nothing hidden step"),
+    ],
+)
+def test_a_plans_cases_are_said_in_words_and_units(group, case, told):
+    assert case_in_words(group, case) == told
+
+
 def test_what_the_list_says_of_a_row(data):
     store = Store(data.folder / "campaigns" / "first")
     (row,) = store.table("identify").to_pylist()
@@ -119,7 +135,7 @@ def test_what_the_list_says_of_a_row(data):
     assert label(row | by_speed | {"variable": None}, 1) == "1 · not adequate · seed 1"
     shown = tables(store)
     assert "A worn one" in progress_bars(store) and "1 of 1" in progress_bars(store)
-    assert [figure.layout.title.text for figure in figures(store)] == [
+    assert [figure.layout.title.text for figure, _ in figures(store)] == [
         "<b>Error of the identified k</b>",
         "<b>What explains the residual first</b>",
     ]

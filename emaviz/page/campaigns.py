@@ -286,9 +286,8 @@ def label(row: Mapping[str, Any], number: int) -> str:
     elif "adequate" not in row:  # what it found is in the tables
         told = ""
     else:
-        told = (
-            "adequate" if row["adequate"] else f"not adequate: {explanation_title(row['variable'], row['modulator'])}"
-        )
+        told = "adequate" if row["adequate"] else explanation_title(row["variable"], row["modulator"])
+        told = "not adequate" if told == NOTHING else told
     return " · ".join(filter(None, (f"{number}", told, case_in_words("", row["case"]), f"seed {row['seed']}")))
 
 

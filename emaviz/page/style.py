@@ -40,6 +40,8 @@ def page() -> Html:
         # a panel scrolls up and down alone: what stands in it is as wide as it
         "[data-dock-region=left] .mantine-ScrollArea-content{display:block!important;min-width:0!important;"
         "max-width:100%}[data-dock-region=left] .js-plotly-plot{max-width:100%}"
+        # a figure takes the panel's width, and does not widen it to what it was drawn with
+        "[data-dock-region=left] div:has(> .js-plotly-plot){contain:inline-size}"
         # tabs stay in sight where what is below them scrolls
         ".mantine-ScrollArea-content [data-dock-area],[data-dock-region=left] .mantine-ScrollArea-content "
         "div:has(> div > div > div > [data-dock-area]){overflow:clip!important}"

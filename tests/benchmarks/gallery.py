@@ -35,8 +35,17 @@ SETTLED_MS, QUICK_MS = 1800, 250
 LONG_MS = 900_000
 EXAMPLES = Path(__file__).parents[2] / "assets" / "examples"
 MOVES = ("running",)  # states that change by themselves
+INNER = "inner "  # begins the name of a tab within a result, which is taken in the middle window alone, too
 BROKEN = "time_s,current_A\n0,1\n0,2\nabc,3\n"
 CLOSE = ".mantine-Notification-closeButton"
+
+
+def inner(page: Any, *titles: str) -> Iterator[str]:
+    """Tabs within a result, one after another."""
+    for title in titles:
+        page.get_by_role("tab", name=title, exact=True).locator("visible=true").click()
+        page.wait_for_timeout(2000)
+        yield f"{INNER}{title.lower()}"
 
 
 def explore(page: Any, app: App, _: Path) -> Iterator[str]:
@@ -50,6 +59,7 @@ def explore(page: Any, app: App, _: Path) -> Iterator[str]:
     page.wait_for_timeout(3000)
     app.strip.rest_at(0.25, "explore")
     yield "result"
+    yield from inner(page, "Phases", "Fan", "Metrics", "Export")
 
 
 def identify(page: Any, app: App, folder: Path) -> Iterator[str]:
@@ -74,6 +84,7 @@ def identify(page: Any, app: App, folder: Path) -> Iterator[str]:
     page.get_by_role("button", name="Identify", exact=True).click()
     page.get_by_role("link", name="in Rerun").wait_for(timeout=LONG_MS)
     yield "result"
+    yield from inner(page, "Search", "Landscape", "History")
     (folder / "data" / "broken.csv").write_text(BROKEN)
     app.tab(IdentifyTab).refresh_files()
     choose(page, "Identify", "broken.csv")
@@ -104,6 +115,7 @@ def compare(page: Any, app: App, folder: Path) -> Iterator[str]:
     page.get_by_role("button", name="The motor needs").first.click(timeout=10_000)
     page.wait_for_timeout(2000)
     yield "region"
+    yield from inner(page, "Against", "Orders", "Explained by", "Calibration")
 
 
 def discover(page: Any, app: App, _: Path) -> Iterator[str]:
@@ -236,7 +248,7 @@ TABS: dict[str, Callable[[Any, App, Path], Iterator[str]]] = {
 def photograph(page: Any, app: App, to: Path, named: str, state: str) -> None:
     """One state, in its windows and both looks."""
     for width, height in WINDOWS.items():
-        if state in MOVES and width != 1400:
+        if width != 1400 and (state in MOVES or state.startswith(INNER)):
             continue
         page.set_viewport_size({"width": width, "height": height})
         settled = QUICK_MS if state in MOVES else SETTLED_MS

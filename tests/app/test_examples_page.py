@@ -61,18 +61,6 @@ def test_the_example_of_runs_is_an_identification_that_is_recorded(page, app):
     page.get_by_text("not healthy: k1, k2, k6").first.wait_for()
 
 
-def test_the_example_of_bode_is_a_sweep_over_a_resonance(page, app):
-    analysing = app.tab(FrequencyTab).analysing
-    example(page, "Bode").click()
-    wait_until(lambda: analysing.job.running)
-    wait_until(lambda: analysing.result is not None)
-    page.get_by_text("The measured resonance lies at 65").locator("visible=true").first.wait_for()
-    assert analysing.result.recordings == ["frequency-example"] and not analysing.provenance.line("")
-    app.comparing.job.stop()
-    wait_until(lambda: not app.session.worker.busy)
-    app.comparing.remove(*app.comparing.opened)
-
-
 def test_the_example_of_compare_holds_one_out(page, app):
     comparing = app.comparing
     example(page, "Compare").click()
@@ -90,3 +78,18 @@ def test_the_example_of_compare_holds_one_out(page, app):
     page.locator(".emaviz-map:visible").wait_for()
     flow.get_by_role("link", name="2 Fit and regions").click()
     page.locator(".emaviz-map").wait_for(state="hidden")
+
+
+def test_the_example_of_bode_is_a_sweep_over_a_resonance(page, app):
+    comparing, analysing = app.comparing, app.tab(FrequencyTab).analysing
+    for name in list(comparing.opened):
+        comparing.remove(name)
+    example(page, "Bode").click()
+    wait_until(lambda: analysing.job.running)
+    page.locator(".emaviz-waits:visible").first.wait_for()
+    wait_until(lambda: analysing.result is not None)
+    page.get_by_text("The measured resonance lies at 65").locator("visible=true").first.wait_for()
+    assert list(analysing.result.recordings) == ["frequency-example"] and list(comparing.opened) == [
+        "uploads/frequency-example.parquet"
+    ]
+    assert not analysing.provenance.line("Frequency response"), "it is of what Compare has"

@@ -414,8 +414,8 @@ def test_a_session_is_saved_and_loaded_with_all_that_is_on_the_page(page, app, t
     assert kept.read_bytes() == copy.read_bytes()
 
     (app.comparing.folder.sessions / "damaged.emaviz").write_text("no session")  # comes beside, and is listed
-    page.get_by_role("tab", name="Explore").click()
-    page.get_by_role("tab", name="Runs").click()
+    page.get_by_role("tab", name="Explore", exact=True).click()
+    page.get_by_role("tab", name="Runs", exact=True).click()
     assert page.get_by_label("Saved", exact=True).input_value() == "sessions/mine.emaviz"
     choose(page, "Saved", "sessions/damaged.emaviz")
     page.get_by_role("button", name="Load session").click()

@@ -14,7 +14,7 @@ import pytest
 PROJECT = Path(__file__).parents[1]
 FLOORS = {
     "ema_model": [
-        ["child_processes", "errors", "kernel_cache", "members", "text"],
+        ["child_processes", "errors", "kernel_cache", "members", "remembered", "text"],
         ["files", "quantities"],
         ["physics", "faults", "result"],
         ["effects", "kernels", "commands"],

@@ -12,7 +12,7 @@ _MOST_BANDS = 3  # in which the magnitudes differ, that are told
 _MOST_NAMES = 3  # of recordings
 _NONE = "–"
 _KINDS = ("resonance", "antiresonance")
-SCATTER = "± is half of a 90 % interval, of coherence and number of averages"
+SCATTER = "± is half of a 90 % interval, which follows from coherence and number of averages"
 
 
 def document_of(result: FrequencyResponse) -> Document:
@@ -141,7 +141,8 @@ def _basis(result: FrequencyResponse) -> str:
 
 
 def _channel(result: FrequencyResponse) -> str:
-    return f"from {result.input} to {result.output}"
+    put_in, answer = (in_sentence(SIGNALS[name].title) for name in (result.input, result.output))
+    return f"From the {put_in} to the {answer}"
 
 
 def _a(kind: str) -> str:

@@ -26,6 +26,7 @@ from ema_model.comparison.residuals import Residuals, residuals_of
 from ema_model.comparison.verdict import ORDER_OF_PRIMARY, lasting, most_of_floor
 from ema_model.estimation.floor import as_it_is, silent
 from ema_model.estimation.model_fit import Data, Fit, floor_ratio
+from ema_model.remembered import remembered
 
 Array = NDArray[np.float64]
 
@@ -113,7 +114,7 @@ def silence(data: Data, found: Fit) -> str:
     return silent(found.plant.windows, data.told_in)[1]
 
 
-@lru_cache(maxsize=16)
+@remembered(of=1)  # the fit
 def lasts(data: Data, found: Fit) -> bool:
     """Whether what is left of a signal lasts longer than noise does, as `compare` has it."""
     fitted = found.calibration.signals

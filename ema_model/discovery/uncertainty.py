@@ -12,7 +12,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import replace
-from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,6 +22,7 @@ from ema_model.estimation.information import by_pieces, posterior
 from ema_model.estimation.model_fit import Data, Fit, fit
 from ema_model.models import Model
 from ema_model.quantities.numbers import HALF_90
+from ema_model.remembered import remembered
 
 Array = NDArray[np.float64]
 
@@ -62,7 +62,7 @@ def signals_of(data: Data, plant: Model) -> Iterator[tuple[str, slice]]:
             row += window.blocks
 
 
-@lru_cache(maxsize=32)
+@remembered(of=1)  # the fit
 def colour_of(data: Data, found: Fit) -> Array:
     """`colour` of what a fit leaves."""
     return colour(data, found.plant, found.residual)
@@ -78,7 +78,7 @@ def _density(parts: list[Array]) -> float:
     return 0.5 * fourth / second if second > 0.0 else 0.0
 
 
-@lru_cache(maxsize=16)  # a page asks at every look
+@remembered(of=1)  # the fit: a page asks at every look
 def with_intervals(data: Data, found: Fit) -> Calibration:
     """A fit's calibration with 90 % intervals that count what is left as it is: as many values as it has shapes.
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,6 +16,7 @@ from ema_model.estimation.model_fit import Data, Fit, holdout_signals, resimulat
 from ema_model.models import Window, model_for
 from ema_model.models.measured_motion import evaluation_stretches
 from ema_model.models.model import Signals
+from ema_model.remembered import remembered
 
 Array = NDArray[np.float64]
 
@@ -47,7 +47,7 @@ def verified(found: Discovery, path: str | os.PathLike[str]) -> Verified:
     return Verified(rmse, held, worse)
 
 
-@lru_cache(maxsize=4)  # a page asks at every look
+@remembered(of=2)  # the fit: a page asks at every look
 def free_simulation(data: Data, held: Data | None, found: Fit) -> dict[str, Simulated]:
     """How far a fit is from each signal when it runs freely over whole recordings, by the signals' names in files."""
     actuator = found.calibration.actuator

@@ -19,6 +19,7 @@ from ema_model.estimation.problem import fitted_signals
 from ema_model.models import Model, model_for
 from ema_model.models.model import Signals
 from ema_model.recordings import Measurement
+from ema_model.remembered import remembered
 
 Array = NDArray[np.float64]
 
@@ -271,7 +272,7 @@ def holdout_error(data: Data, found: Fit) -> float:
     return holdout_fit(data, found)[0]
 
 
-@lru_cache(maxsize=8)  # a trial is judged by it, and its step of the ladder shows it
+@remembered(of=1)  # the fit: a trial is judged by it, and its step of the ladder shows it
 def holdout_fit(data: Data, found: Fit) -> tuple[float, dict[str, float], dict[str, float]]:
     """`floor_ratio` of recordings that were not fitted, `rms_by_signal` and `ratio_by_recording`."""
     return resimulated(data, found.calibration.actuator)

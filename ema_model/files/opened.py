@@ -249,7 +249,8 @@ def _told() -> Iterator[None]:
     except (Damaged, MemoryError):
         raise
     except Exception as error:
-        raise Damaged(f"{type(error).__name__}: {shown(error, 80)}" if str(error) else type(error).__name__) from None
+        name = "" if isinstance(error, zipfile.BadZipFile) else f"{type(error).__name__}: "
+        raise Damaged(f"{name}{shown(error, 80)}" if str(error) else type(error).__name__) from None
 
 
 # --- the files that come with the package -----------------------------------------------------------------------------

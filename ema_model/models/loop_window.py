@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from functools import lru_cache
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -18,6 +17,7 @@ from ema_model.recordings import SIGNALS, Measurement
 from ema_model.recordings.column_mapping import MOST_DUTY
 from ema_model.recordings.noise import beating, held, is_of_grid
 from ema_model.recordings.read import WITHOUT_COMMAND
+from ema_model.remembered import remembered
 from ema_model.simulation.pack import integral_at_start
 from ema_model.simulation.run import steps_per_sample
 
@@ -222,7 +222,9 @@ def _before(measurement: Measurement, actuator: Actuator, run: slice, steps: int
     return _put_in(measurement, "command_rad", first, last, lead, step_s, actuator.sensors.delay_s)
 
 
-@lru_cache(maxsize=64)  # every model of a discovery is put beside the same windows, and what came before each
+@remembered(
+    of=0
+)  # the measurement: every model of a discovery is put beside the same windows, and what came before each
 def _put_in(
     measurement: Measurement, name: str, first: int, last: int, steps: int, step_s: float, delay_s: float
 ) -> Array:

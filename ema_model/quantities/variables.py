@@ -65,6 +65,18 @@ def variable_title(name: str) -> str:
     return VARIABLES[name].title if name in VARIABLES else name.replace("_", " ")
 
 
+NOTHING = "nothing"  # explains it
+
+
+def explanation_title(variable: str | None, modulator: str | None) -> str:
+    """'Motor speed × direction' of 'motor_speed' and 'sign_speed'; 'nothing' without a variable."""
+    if not variable:
+        return NOTHING
+    by = MODULATORS.get(modulator or "1")
+    more = "" if by is None or not by.noun else f" {by.title}"
+    return variable_title(variable) + more
+
+
 def is_turn(name: str, axes: Axes) -> bool:
     """Whether it is an angle that comes round again: of a rotary motor."""
     return name == "motor_angle" and not axes.is_linear(MOTOR)

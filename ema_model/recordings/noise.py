@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
+import hashlib
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import lru_cache
 from itertools import pairwise
 from math import comb
 
@@ -44,7 +44,7 @@ def sample_noise(values: Array, signal: str) -> float:
     shows where it moves slowly whether it has more noise than the grid's, s/√12.  Never 0: a floor is what errors are
     counted in.
     """
-    return max(_own_noise(np.asarray(values, dtype=float).tobytes())[0], least_noise(signal))
+    return max(_own_noise(values)[0], least_noise(signal))
 
 
 def scatter_of(values: Array, along: Sequence[Array], signal: str) -> float:
@@ -72,13 +72,30 @@ def scatter_of(values: Array, along: Sequence[Array], signal: str) -> float:
 
 def is_of_grid(values: Array) -> bool:
     """Whether a signal's noise (samples,) is that of the grid on which it lies, and so known without a guess."""
-    return _own_noise(np.asarray(values, dtype=float).tobytes())[1]
+    return _own_noise(values)[1]
 
 
-@lru_cache(maxsize=256)  # every model of a discovery asks it of the same recordings and of their parts
-def _own_noise(given: bytes) -> tuple[float, bool]:
-    """`sample_noise` of float64 values, before a signal's least, and whether it is a grid's."""
-    values = np.frombuffer(given)
+_MOST_KNOWN = 256
+_known: dict[bytes, tuple[float, bool]] = {}  # by the digests of signals, which for themselves may take a gigabyte
+
+
+def _own_noise(values: Array) -> tuple[float, bool]:
+    """`sample_noise` before a signal's least, and whether it is a grid's.
+
+    Every model of a discovery asks it of the same recordings and of their parts.
+    """
+    given = np.ascontiguousarray(values, dtype=float)
+    digest = hashlib.sha256(given.data).digest()
+    found = _known.get(digest)
+    if found is None:
+        found = _known[digest] = _found_noise(given)
+        for oldest in list(_known)[:-_MOST_KNOWN]:
+            _known.pop(oldest, None)  # another thread may have done so
+    return found
+
+
+def _found_noise(values: Array) -> tuple[float, bool]:
+    """The same of float64 values."""
     steps = np.abs(np.diff(values))
     steps = steps[steps > _ROUNDING * (1.0 + np.max(np.abs(values)))]
     step = float(np.min(steps)) if len(steps) else 0.0

@@ -22,12 +22,14 @@ from emaviz.figures.theme import line
 
 # --- how often each answer was given: bars, a row a case, its parts side by side --------------------------------------
 
+_FEW_TASKS = 10
+
 
 def counted(title: str, counts: Mapping[str, Mapping[str, int]], *, dark: bool = False) -> go.Figure:
     """counts: by case, of each answer."""
     chart = theme.new(title, "Tasks", "", dark=dark)
     cases = list(counts)
-    answers = list(dict.fromkeys(answer for one in counts.values() for answer in one))
+    answers = sorted({answer for one in counts.values() for answer in one})  # so that each keeps its colour
     for i, answer in enumerate(answers):
         chart.add_trace(
             go.Bar(
@@ -39,7 +41,10 @@ def counted(title: str, counts: Mapping[str, Mapping[str, int]], *, dark: bool =
             )
         )
     chart.update_layout(barmode="stack")
-    chart.update_yaxes(autorange="reversed", nticks=0)
+    chart.update_yaxes(autorange="reversed", tickmode="linear", dtick=1)
+    most = max((sum(one.values()) for one in counts.values()), default=0)
+    if most <= _FEW_TASKS:
+        chart.update_xaxes(tick0=0, dtick=1)  # there are no halves of a task
     return chart
 
 

@@ -575,8 +575,9 @@ def sketch(figure: go.Figure) -> Html:
     x_title, y_title = (_TAG.sub("", axis.title.text or "") for axis in (figure.layout.xaxis, figure.layout.yaxis))
     svg = unescaped(f'<svg viewBox="0 0 {wide} {tall}" aria-hidden="true">{"".join(drawn)}</svg>')
     ends = [number(one, 2) for one in (low, high, left, right)]
+    axis = "<small>{}: <span>{} … {}</span></small>"
     return html(
-        '<figure class="emaviz-sketch"><small>{}: {} … {}</small>{}<small>{}: {} … {}</small></figure>',
+        f'<figure class="emaviz-sketch">{axis}{{}}{axis}</figure>',
         unescaped(y_title),
         *ends[:2],
         svg,

@@ -20,8 +20,9 @@ from emaviz.figures import theme
 # Each unit's parameters with their intervals, beside what the type shares: a small chart for each parameter.
 
 _TYPE = "rgba(134,142,150,0.30)"
+_SIGNS = "grey band: nine of ten units of the type; ◆: the unit differs from it"
 _COLUMNS = 3
-_HEAD_PX, _AXIS_PX = 38, 60  # of the whole, and below each chart
+_HEAD_PX, _AXIS_PX = 54, 60  # of the whole, and below each chart
 _LEAST_ROW_PX, _ROW_PX, _MOST_ROW_PX = 11, 17, 40  # of a unit in it: as it can be read, easily, and with much room
 
 
@@ -38,8 +39,9 @@ def unit_parameters(result: UnitsCompared, *, dark: bool = False) -> go.Figure:
         horizontal_spacing=0.05,
         vertical_spacing=min(_AXIS_PX / (least_px(result) - _HEAD_PX - _AXIS_PX), 0.9 / max(rows - 1, 1)),
     )
-    like: Any = theme.new("Parameters of each unit, alone (90 % intervals)", "", "", dark=dark).layout
+    like: Any = theme.new("Parameters of each unit, fitted alone, with 90 % intervals", "", "", dark=dark).layout
     grid.update_layout(template=like.template, title=like.title)
+    grid.layout.title.text += f'<br><span style="font-size:11px">{_SIGNS}</span>'
     names = [theme.plain(name) for name in result.units]
     for place, path in enumerate(paths):
         where = {"row": place // _COLUMNS + 1, "col": place % _COLUMNS + 1}
@@ -120,7 +122,7 @@ def transfer_matrix(result: UnitsCompared, *, dark: bool = False) -> go.Figure:
     shown = of_signal(moved.signal, axes)
     full = len(result.units) <= _IN_FULL
     beside = f", and rms of the {in_sentence(shown.title)}" if full else ""
-    chart = theme.new(f"Error, × floor{beside}", "Recordings of", "Model of", dark=dark)
+    chart = theme.new(f"Error, × noise floor{beside}", "Recordings of", "Model of", dark=dark)
     names = [theme.plain(name) for name in result.units]
     errors = [[amount(value, shown.unit) for value in row] for row in moved.error]
     worse = moved.floors / np.maximum(np.diag(moved.floors), 1e-300)

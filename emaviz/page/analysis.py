@@ -5,18 +5,20 @@ A tab's own file says which analysis, and what to say before there is an answer.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from typing import Any, ClassVar
 
 import plotly.graph_objects as go
 import viser
 
+from ema_model.actuator import Actuator
 from ema_model.analyses import analyses
 from ema_model.quantities.titles import in_sentence
+from ema_model.recordings.measurement import Measurement
 from ema_model.result import Result
 from ema_model.text import Document, Lines
-from emaviz.page.panel import RECORD, REPORT, JobLine, KeepButtons, Keeps
+from emaviz.page.panel import RECORD, REPORT, Example, JobLine, KeepButtons, Keeps
 from emaviz.page.share import Place
 from emaviz.page.tab import Shared, Standing, Tab
 from emaviz.page.window_layout import COLUMNS, NEXT_COLUMN
@@ -24,7 +26,7 @@ from emaviz.page.workspaces import Page
 from emaviz.recording.viewer import ViewerHost
 from emaviz.session.analysis import Analysing
 from emaviz.session.session_file import Part
-from emaviz.text.html import BOX, add_html, begin, html, note
+from emaviz.text.html import BOX, add_html, begin, html, note, waiting
 from emaviz.text.results import large, whole
 from emaviz.views import ANSWER, Figures, Section, View, Words, view_for
 
@@ -37,10 +39,17 @@ class AnalysisResult:
     """The panel on the right.  Everything here is built and changed on the screen's thread."""
 
     def __init__(
-        self, page: Page, analysing: Analysing, view: View[Any], before: str, viewer: ViewerHost | None
+        self,
+        page: Page,
+        analysing: Analysing,
+        view: View[Any],
+        before: str,
+        meanwhile: str,
+        viewer: ViewerHost | None,
     ) -> None:
-        """before: HTML that stands there while there is no answer."""
-        self._page, self._view, self._before = page, view, before
+        """before: HTML that stands there while there is no answer; meanwhile: what is said while it is computed."""
+        self._page, self._analysing, self._view, self._before = page, analysing, view, before
+        self._meanwhile = meanwhile
         gui = page.server.gui
         add_html(gui, COLUMNS)
         self._told = add_html(gui, before)
@@ -51,6 +60,11 @@ class AnalysisResult:
         self._save = gui.add_folder("Keep it", visible=False)
         with self._save:
             self._keep = AnalysisKeep(page, analysing, viewer)
+
+    def busy(self, busy: bool) -> None:
+        """Whether a run goes on: where there is no answer yet, it is said that it does."""
+        if self._analysing.result is None:
+            self._told.content = waiting(self._analysing.job.title, self._meanwhile) if busy else self._before
 
     def show(self, result: Result | None) -> None:
         """An answer; None for none."""
@@ -174,6 +188,7 @@ class AnalysisPanel:
         with self._page.server.atomic():
             for control in (self._start, *self._options.values()):
                 control.disabled = busy
+            self._result.busy(busy)
 
 
 class AnalysisTab(Tab):
@@ -182,20 +197,30 @@ class AnalysisTab(Tab):
     analysis: ClassVar[str]  # its name
     about: ClassVar[str]  # what it is for, above the controls
     steps: ClassVar[Sequence[str]]  # to an answer, while there is none
+    meanwhile: ClassVar[str]  # what is done while it runs
+    example: ClassVar[tuple[str, str]]  # its button, and what that does
+    record_example: ClassVar[Callable[[Actuator], Measurement]]  # of the standard actuator
 
     def __init__(self, shared: Shared, right: viser.PanelHandle) -> None:
         super().__init__(shared, right)
         of = analyses()[self.analysis]
         self.analysing = Analysing(of, shared.comparing, shared.files)
         self._standing = self.standing(self.analysing.provenance)
-        before = begin(f"There is no {in_sentence(of.title)} yet", self.steps)
+        shipped = Example(self.page, *self.example, self._run_example)
+        before = begin(f"There is no {in_sentence(of.title)} yet", self.steps, shipped.html)
         with right.add_tab(of.title, self.workspace.icon):
             self._standing.add(self.page.server.gui)
-            self.result = AnalysisResult(self.page, self.analysing, view_for(of.result), before, shared.viewer)
+            self.result = AnalysisResult(
+                self.page, self.analysing, view_for(of.result), before, self.meanwhile, shared.viewer
+            )
 
     def build(self) -> None:
         """The options, and the run."""
         self.panel = AnalysisPanel(self, self.analysing, self.result, self._standing)
+
+    def _run_example(self) -> None:
+        record, name = type(self).record_example, f"{self.analysis}-example.parquet"
+        self.page.begins(lambda: self.analysing.begin_example(record, name), title=self.example[0])
 
     def refresh_files(self) -> None:
         """What Compare has."""

@@ -12,7 +12,9 @@ import viser
 
 from ema_model.campaign.result import Campaign
 from ema_model.campaign.store import Store, summaries
+from ema_model.discovery.result import effect_title
 from ema_model.errors import InputError
+from ema_model.quantities.variables import NOTHING, explanation_title
 from ema_model.recordings import Measurement
 from emaviz.figures.campaign import counted
 from emaviz.page.panel import JobLine
@@ -24,7 +26,7 @@ from emaviz.session.campaigns import REPORT, Campaigns, Computing
 from emaviz.session.inputs import Provenance
 from emaviz.session.jobs import Worker
 from emaviz.text.html import Html, add_html, begin, html, joined, said
-from emaviz.views.campaign import answers, errors_drawn
+from emaviz.views.campaign import answers, case_in_words, counted_px, errors_drawn, in_words
 
 # --- campaigns, below the recordings: which one, its progress, and the row that opens as a run ------------------------
 
@@ -36,7 +38,7 @@ _STEPS = (
     "Rows, errors and answers are drawn here as they come; a Stop keeps them, and it goes on from there.",
 )
 _THESIS = {"thesis_quick": "thesis: reproduce it, quick", "thesis": "thesis: reproduce it, whole"}
-_MOST_FIGURES, _ASPECT = 2, 0.32
+_MOST_FIGURES, _ASPECT, _ERRORS_PX = 2, 0.32, 320
 _MOST_ROWS = 500  # that can be chosen from: of a group, the errors and the worst first
 _BOX = Html('style="padding:2px 10px;font-size:12.5px;line-height:1.45"')
 
@@ -152,7 +154,8 @@ class CampaignControls:
         drawn = figures(store)
         for place, plot in enumerate(self._figures):
             if place < len(drawn):
-                plot.figure = drawn[place]
+                plot.figure, height_px = drawn[place]
+                self._page.workspaces.heights.set_height(plot, height_px)
             plot.visible = place < len(drawn)
 
     def _begun(self) -> None:
@@ -255,12 +258,13 @@ class _Starts:
         self._tell_soon()
 
 
-def figures(store: Store) -> list[go.Figure]:
-    """How the errors of identifications are spread, and how often what was answered."""
+def figures(store: Store) -> list[tuple[go.Figure, int]]:
+    """How the errors of identifications are spread, and how often what was answered; with their heights, px."""
     found = Campaign(store)
     known = found.of_known_truth()
-    drawn = [errors_drawn(known)] if known else []
-    return (drawn + [counted(title, counts) for title, counts in answers(found).items()])[:_MOST_FIGURES]
+    drawn = [(errors_drawn(known), _ERRORS_PX)] if known else []
+    told = [(counted(title, counts), counted_px(counts)) for title, counts in answers(found).items()]
+    return [*drawn, *told][:_MOST_FIGURES]
 
 
 def progress_bars(store: Store) -> Html:
@@ -270,7 +274,7 @@ def progress_bars(store: Store) -> Html:
             '<tr><td>{}</td><td style="width:220px;vertical-align:middle">'
             '<div class="emaviz-job-share" style="width:200px"><i style="width:{:.1f}%"></i></div></td>'
             "<td>{} of {}{}</td></tr>",
-            group,
+            in_words(group),
             100.0 * one["rows"] / max(one["tasks"], 1),
             one["rows"],
             one["tasks"],
@@ -287,15 +291,16 @@ def label(row: Mapping[str, Any], number: int) -> str:
     if row["error"] is not None:
         told = "error"
     elif "verdict" in row:
-        told = " + ".join(row["effects"] or ()) or row["verdict"] or "not showable"
+        told = " + ".join(map(effect_title, row["effects"] or ())) or in_words(row["verdict"] or "not showable")
     elif "error_wrapped_percent" in row:
         error = row["error_wrapped_percent"]
         told = f"rmse {row['rmse_A']:.3f} A" if error is None else f"Err {error:.2f} %"
     elif "adequate" not in row:  # what it found is in the tables
         told = ""
     else:
-        told = "adequate" if row["adequate"] else str(row["variable"] or "not adequate")
-    return " · ".join(filter(None, (f"{number}", told, row["case"], f"seed {row['seed']}")))
+        told = "adequate" if row["adequate"] else explanation_title(row["variable"], row["modulator"])
+        told = "not adequate" if told == NOTHING else told
+    return " · ".join(filter(None, (f"{number}", told, case_in_words("", row["case"]), f"seed {row['seed']}")))
 
 
 def tables(store: Store) -> Html:

@@ -44,10 +44,11 @@ class _Figure:
     usual_px: int
     most_px: int
     beside_px: int
+    columns: int  # of the panel where it stands, at most
 
     def aspect(self, width_px: int, window_px: int) -> float:
         """In a window; where one column holds everything, and is scrolled, no more than is read easily."""
-        columns = 2 if width_px >= TWO_COLUMNS_PX else 1
+        columns = self.columns if width_px >= TWO_COLUMNS_PX else 1
         room = window_px - self.beside_px if columns == 2 else self.usual_px
         return min(self.most_px, max(self.least_px, room)) / ((width_px - LEFT_PX) / columns - _FRAME_PX)
 
@@ -76,7 +77,15 @@ class ChartHeights:
 
         usual_px: where one column holds everything; beside_px: of a window, what else stands above and below it.
         """
-        one = self._figures[id_of(figure)] = _Figure(figure, least_px, usual_px, most_px, beside_px)
+        self._set(_Figure(figure, least_px, usual_px, most_px, beside_px, 2))
+
+    def set_height(self, figure: Any, height_px: int) -> None:
+        """A Plotly figure as wide as its panel, from now on that high."""
+        self._set(_Figure(figure, height_px, height_px, height_px, 0, 1))
+
+    def _set(self, one: _Figure) -> None:
+        figure = one.figure
+        self._figures[id_of(figure)] = one
         figure.aspect = one.aspect(_USUAL_WIDTH_PX, _USUAL_PX)
         for client in self._inside.pages():
             self._set_aspects(client)

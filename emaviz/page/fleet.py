@@ -61,7 +61,7 @@ _HEAD_PX, _ROW_PX, _FEWEST_ROWS = 110, 34, 4  # of the matrix
 _EXAMPLE = "Run an example", "Six units of one type, of which two differ: made in the data folder, then compared."
 
 
-_WAITING = "One model is fitted to all units; then a parameter is let go where a unit differs."
+_WAITING = "One model is fitted to all units; then a unit that differs has a parameter of its own."
 
 
 class UnitsResult:

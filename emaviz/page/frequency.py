@@ -6,6 +6,7 @@ from typing import ClassVar
 
 import viser
 
+from ema_model.analyses.frequency_example import sweep
 from emaviz.page.analysis import AnalysisTab
 from emaviz.page.workspaces import Workspace
 from emaviz.text.html import Html
@@ -27,3 +28,9 @@ class FrequencyTab(AnalysisTab):
         Html("Press <b>Frequency response</b>: the model is simulated on what was put in."),
         "You see magnitude, phase and coherence, and read where measured and model differ beyond the scatter.",
     )
+    meanwhile = "The model is simulated on what was put in, and both responses are estimated alike."
+    example = (
+        "Run an example",
+        "A sweep over the resonance of a shaft that twists: simulated, then analysed.",
+    )
+    record_example = sweep

@@ -82,11 +82,11 @@ class SessionControls:
         self._load.on_click(lambda _: self._load_named(str(self._choice.value)))
         self.refresh()
 
-    def refresh(self) -> None:
-        """Reads the folder's list again."""
-        names = self._comparing.folder.session_files()
+    def refresh(self, newest: bool = True) -> None:
+        """Reads the folder's list again; newest: chooses that one, and not what is chosen as long as it is there."""
+        names, chosen = self._comparing.folder.session_files(), str(self._choice.value)
         self._choice.options = names or [_NONE]
-        self._choice.value = (names or [_NONE])[0]
+        self._choice.value = chosen if chosen in names and not newest else (names or [_NONE])[0]
         self._load.disabled = not names
 
     def uploaded(self, path: Path) -> None:
@@ -185,11 +185,11 @@ class RunsResult:
         self._opened = url, name
         url += f"&theme={'dark' if self._dark else 'light'}"
         self._frame.content = share_line(WORKSPACE.name, {"run": [name]}) + html(
-            '<div style="padding:0 10px 4px;font-size:12px;overflow-wrap:anywhere"><b>{}</b> · '
-            '<a href="{}" target="_blank" rel="noopener">in a tab of its own ↗</a></div>'
-            '<iframe class="emaviz-rerun" src="{}" title="Rerun viewer" '
-            'style="width:100%;height:calc(100vh - 205px);border:0"></iframe>',
+            '<div class="emaviz-viewer"><div><b>{}</b> · <button onclick="{}"><span>over the whole window ⤢</span>'
+            '<span>back to the page ⤡</span></button> · <a href="{}" target="_blank" rel="noopener">in a tab of its '
+            'own ↗</a></div><iframe class="emaviz-rerun" src="{}" title="Rerun viewer"></iframe></div>',
             name,
+            "this.closest('.emaviz-viewer').classList.toggle('emaviz-whole')",
             url,
             url,
         )
@@ -594,7 +594,8 @@ class RunsTab(Tab):
         self.shared.files.post("follow", lambda: self.panel.follow(url, name))
 
     def refresh_files(self) -> None:
-        """Plans that may be computed."""
+        """Sessions that may be loaded, and plans that may be computed."""
+        self.sessions.refresh(newest=False)
         self.campaigns.starts.refresh()
 
     def kept(self) -> dict[str, Part]:

@@ -40,6 +40,8 @@ def page() -> Html:
         # a panel scrolls up and down alone: what stands in it is as wide as it
         "[data-dock-region=left] .mantine-ScrollArea-content{display:block!important;min-width:0!important;"
         "max-width:100%}[data-dock-region=left] .js-plotly-plot{max-width:100%}"
+        # a figure takes the panel's width, and does not widen it to what it was drawn with
+        "[data-dock-region=left] div:has(> .js-plotly-plot){contain:inline-size}"
         # tabs stay in sight where what is below them scrolls
         ".mantine-ScrollArea-content [data-dock-area],[data-dock-region=left] .mantine-ScrollArea-content "
         "div:has(> div > div > div > [data-dock-area]){overflow:clip!important}"
@@ -53,7 +55,8 @@ def page() -> Html:
         "div:has(> .mantine-Slider-root) + .mantine-NumberInput-root,"
         "div:has(> * .mantine-Slider-root) > .mantine-NumberInput-root{width:3.9rem!important}"
         # five tabs of a narrow panel on the right in one line, too
-        "[data-dock-region=right] [data-dock-tab]{padding-left:9px!important;padding-right:9px!important}"
+        "[data-dock-region=right] [data-dock-tab]{padding-left:9px!important;padding-right:9px!important;"
+        "max-width:none!important}"
         "@media (max-width: 1250px){[data-dock-region=right] [data-dock-tab] > div:has(svg){display:none!important}}"
         # what is chosen from a list ends before the list's mark
         "input[aria-haspopup=listbox]{text-overflow:ellipsis!important;padding-right:1.7em!important}"
@@ -85,6 +88,13 @@ def page() -> Html:
         "line-height:20px}.emaviz-report{padding:6px 12px 0;font-size:14px}"
         ".emaviz-share a{color:inherit;text-underline-offset:2px}"
         "@media (min-width:900px){[data-dock-region=right] .emaviz-share{position:fixed;top:20px;right:34px;z-index:5}}"
+        # Rerun's viewer, in the panel or over the whole window
+        ".emaviz-viewer > div{padding:0 10px 4px;font-size:12px;overflow-wrap:anywhere}.emaviz-viewer button{"
+        "font:inherit;color:inherit;background:none;border:0;padding:0;text-decoration:underline;cursor:pointer}"
+        ".emaviz-viewer iframe{width:100%;height:calc(100vh - 205px);border:0}.emaviz-whole{position:fixed;inset:0;"
+        "z-index:300;background:var(--mantine-color-body)}.emaviz-whole > div{padding:5px 10px!important}"
+        ".emaviz-whole iframe{height:calc(100vh - 30px)}.emaviz-viewer:not(.emaviz-whole) button span:last-child,"
+        ".emaviz-whole button span:first-child{display:none}"
         "</style>"
     )
     return rules + _strip() + _jobs() + window_layout.style() + charts.style() + measure.style()

@@ -215,6 +215,9 @@ class TrackResult:
     def show_first(self, flights: Sequence[Flight], count: int) -> None:
         """The first flights, before there are enough to follow; count: in all."""
         self.show(None)
+        if not flights:  # an empty chart tells nothing
+            self._told.content = waiting(_TITLE, _WAITING)
+            return
         left_out = sum(bool(one.excluded) for one in flights)
         more = f", {left_out} of them not usable" if left_out else ""
         told = f"{len(flights)} of {count} flights are identified{more}. A trend is looked for from {LEAST_FLIGHTS} on."

@@ -82,6 +82,7 @@ _SOLID = ((BOXES[0], _COVERED_PX), (BOXES[3], _OWN_PX), (BOXES[4], _OWN_PX), (_S
 _LEADER_PX = 9.0  # from where on a line leads to the place
 _FIRST_PICTURE = (604, 832)  # px, until a browser tells
 _LEAST_NAMED_PX = 400  # high: a smaller picture has room for what is told, but not for the parts' names
+_LEAST_TOLD_PX = 220  # high: a smaller one has room for faults alone
 _TOP_PX = 20.0  # where windows have their handles
 
 
@@ -234,10 +235,12 @@ class Labels:
 
     def _arrange(self) -> None:
         with self._arranging:
-            names = self._names if self._picture[1] >= _LEAST_NAMED_PX else []
+            height = self._picture[1]
+            names = self._names if height >= _LEAST_NAMED_PX else []
             named = {one.names for one in self._callouts}
             names = [one for one in names if one.name not in named]
-            labels = [*self._callouts, *self._told, *names] if self._shown else []
+            told = [] if self._callouts and height < _LEAST_TOLD_PX else self._told
+            labels = [*self._callouts, *told, *names] if self._shown else []
             placed = self._lay_out(labels)
             for name in self._handles.keys() - {one.label.name for one in placed}:
                 self._put(name, "", (0.0, 0.0, 0.0), False, visible=False)

@@ -26,6 +26,7 @@ _SAY = r"""
   }
   line.style.color = calm ? 'var(--mantine-color-dimmed)' : 'light-dark(#e03131,#ff8787)';
   line.textContent = text;
+  if (!calm && document.hasFocus()) line.scrollIntoView({ block: 'nearest' });
 })(ID, TEXT, CALM)
 """
 

@@ -5,20 +5,25 @@ Any of `ema_model.analyses`: what it may be told and what it answers with is sta
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
 import msgspec
 
+from ema_model.actuator import Actuator, load_actuator
 from ema_model.analyses import Analysis
 from ema_model.errors import InputError
 from ema_model.quantities.titles import in_sentence
+from ema_model.recordings import write_measurement
+from ema_model.recordings.measurement import Measurement
 from ema_model.result import Result
 from emaviz.session.compare import Comparing
-from emaviz.session.files import all_measured
+from emaviz.session.files import Opened, all_measured
 from emaviz.session.inputs import Inputs, Provenance
-from emaviz.session.jobs import Job, Run, Signal, Worker
+from emaviz.session.jobs import Job, Run, Signal, Worker, aside
 from emaviz.session.settings import taken
 
 
@@ -82,6 +87,38 @@ class Analysing:
             self.events.found(found)
 
         return self.provenance.begin(lambda: self.job.begin(self.analysis.title, work, done), of)
+
+    def begin_example(self, record: Callable[[Actuator], Measurement], name: str) -> bool:
+        """Records something to try it on, opens that on Compare, and begins; False while another long run goes on.
+
+        record(actuator): of the standard actuator; name: of the file in the data folder.
+        """
+        comparing, standard = self.comparing, load_actuator()
+        folder, file = comparing.folder, ""
+        if comparing.actuator.name != standard.name:
+            comparing.choose_actuator(standard.name)
+
+        def simulated() -> str:
+            with TemporaryDirectory(prefix="emaviz-example-") as scratch:
+                path = Path(scratch) / name
+                write_measurement(record(standard), path)
+                return folder.name_of(folder.take_in(path))
+
+        def work(run: Run) -> None:
+            nonlocal file
+            file = aside(simulated, run, "simulating; the effect is compiled on its first use")
+
+        def done() -> None:
+            comparing.events.opened.connect(opened)
+            comparing.add(file)
+
+        def opened(one: Opened) -> None:
+            if one.name == file:
+                comparing.events.opened.disconnect(opened)
+                if not self.begin():  # a comparison, say: it goes on once that has ended
+                    self.job.begin_in_turn(self.analysis.title, self.begin)
+
+        return self.job.begin("Recording an example", work, done)
 
     def save(self, suffix: str) -> None:
         """Writes the last answer, soon, in the form that the suffix names; InputError before there is one."""

@@ -171,7 +171,7 @@ class FileJobs:
         try:
             job()
         except InputError as error:
-            line = str(error).replace(f"{self._folder.folder}/", "")  # the page knows its files by their names there
+            line = self._folder.named_in(str(error))
             self._failed(what, name, line)
             self._told(_CANNOT[what], line)
             return
@@ -303,7 +303,10 @@ class Comparing:
         if opened is not None and opened.recorded is not None:
             return prepared(opened.recorded, actuator)
         path = self.folder.measurement(name)
-        measurement = read(path, actuator, side=side_file_of(path, self.folder) or SideFile())
+        try:
+            measurement = read(path, actuator, side=side_file_of(path, self.folder) or SideFile())
+        except InputError as error:
+            raise InputError(self.folder.named_in(str(error))) from None
         if measurement.reading.told:
             self.session.events.told("Columns were guessed", f"{path.name}: {measurement.reading.told}")
         return measurement

@@ -205,6 +205,10 @@ class DataFolder:
             raise InputError(f"{shown(given, 300)}: cannot be copied into the data folder ({error.strerror})") from None
         return path.resolve()
 
+    def named_in(self, line: str) -> str:
+        """A line with this folder's files by their names here, by which the page knows them."""
+        return line.replace(f"{self.folder}/", "")
+
     def name_of(self, path: Path) -> str:
         """As `measurements` lists it."""
         return path.resolve().relative_to(self.folder).as_posix()

@@ -157,7 +157,7 @@ class ComparingUnits:
         """The units' recordings; of several, those that are too short are left out, and told."""
 
         def left_out(line: str) -> None:
-            self.session.events.told("A recording is left out", line.replace(f"{self.folder.folder}/", ""))
+            self.session.events.told("A recording is left out", self.folder.named_in(line))
 
         found: dict[str, list[Measurement]] = {name: [] for name in units}
         every = [(name, file) for name, files in units.items() for file in files]

@@ -229,7 +229,7 @@ class Following:
             paths = in_order(recordings_in(folder)) if self.chosen == "." else flights_in(folder)
             check_order(paths)
         except InputError as error:
-            raise InputError(str(error).replace(f"{self.folder.folder}/", "")) from None
+            raise InputError(self.folder.named_in(str(error))) from None
         if not self.watching:
             check_enough(paths, self.chosen)
         return paths
@@ -275,7 +275,7 @@ class Following:
                 self.session.events.told("Columns were guessed", f"{path.name}: {recording.reading.told}")
             flight = identified(recording, path.stem, self.session.actuator, on_iteration=told)
         except InputError as error:
-            self.left_out[path.name] = str(error).replace(f"{self.folder.folder}/", "")
+            self.left_out[path.name] = self.folder.named_in(str(error))
             self.events.left_out()
             return
         self._flights[path] = flight

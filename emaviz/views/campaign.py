@@ -2,23 +2,31 @@
 
 from __future__ import annotations
 
+import re
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from typing import Any
 
 import numpy as np
 import plotly.graph_objects as go
 
 from ema_model import faults
+from ema_model.actuator.parameters import on_axes
 from ema_model.campaign.kinds import benchmark
 from ema_model.campaign.result import Campaign, made_with
 from ema_model.campaign.store import failed, summaries
+from ema_model.discovery.result import effect_title
+from ema_model.effects import CATALOGUE
+from ema_model.quantities.axes import ROTARY
+from ema_model.quantities.numbers import amount
+from ema_model.quantities.titles import in_sentence
+from ema_model.quantities.variables import explanation_title
 from emaviz.figures import campaign
 from emaviz.text.results import Meaning
 from emaviz.views import Columns, Line, Piece, Row, Section, View
 
 _LEAST = 3  # identifications of a group whose spread is drawn
-_MOST_ANSWERS = 8
+_MOST_ANSWERS, _ANOTHER = 8, "another"
 _ROW_PX = 24
 _MOST_ERRORS = 200  # that are listed
 _MOST_WORKERS = 8  # that are drawn
@@ -27,6 +35,31 @@ _MOST_WORKERS = 8  # that are drawn
 def pairs(figures: list[go.Figure], height_px: int) -> Iterator[Row]:
     """Two and two beside each other."""
     return (Row(figures[at : at + 2], height_px) for at in range(0, len(figures), 2))
+
+
+def in_words(name: str) -> str:
+    """'nothing hidden step' of a plan's 'nothing_hidden_step'."""
+    return name.replace("_", " ")
+
+
+def case_in_words(group: str, case: str) -> str:
+    """'cogging torque 24.0 mN·m' of the group 'cogging_torque' and its case 'cogging_torque 0.024'."""
+    told, of = _VALUE.sub(_value_in_words, case), in_words(group)
+    return told if of in told.replace("-", " ") else " · ".join(filter(None, (of, told)))
+
+
+_VALUE = re.compile(r"\b([a-z]\w*(?:\.\w+)?)([ +=])(-?\d[\d.]*(?:e[+-]?\d+)?)")  # a name and a number in a case
+
+
+def _value_in_words(told: re.Match[str]) -> str:
+    """An effect with its first parameter's value, or a parameter of the actuator; others as they are."""
+    name, sign, value = told.groups()
+    path = f"effects.{name}.{CATALOGUE[name].parameters[0].name}" if name in CATALOGUE else name
+    named = on_axes(path, ROTARY)
+    if "." not in path or named.title == path:
+        return told.group()
+    title = CATALOGUE[name].title if name in CATALOGUE else named.title
+    return f"{in_sentence(title)} {sign.strip('= ')}{amount(float(value), named.unit)}"
 
 
 def tasks(result: Campaign) -> Iterator[Piece]:
@@ -50,14 +83,14 @@ def _distributions(result: Campaign) -> Iterator[Piece]:
     yield Row([errors_drawn(known)], 360)
     drawn = []
     for i, fault in enumerate(faults.FAULTS):
-        off = {group: [_off(row, i) for row in rows] for group, rows in known.items()}
+        off = {in_words(group): [_off(row, i) for row in rows] for group, rows in known.items()}
         drawn.append(campaign.error_distribution(f"{fault.label}: found − true", f"Δ{fault.name} [-]", off))
     yield from pairs(drawn, 280)
 
 
 def errors_drawn(known: dict[str, list[dict[str, Any]]]) -> go.Figure:
     """How Err is spread in each group."""
-    errors = {group: [row["error_wrapped_percent"] for row in rows] for group, rows in known.items()}
+    errors = {in_words(group): [row["error_wrapped_percent"] for row in rows] for group, rows in known.items()}
     return campaign.error_distribution("Error of the identified k", "Err [%]", errors)
 
 
@@ -70,7 +103,12 @@ def _off(row: dict, i: int) -> float:
 def _answers(result: Campaign) -> Iterator[Piece]:
     """Bars, a row a case, of discoveries and comparisons."""
     for title, counts in answers(result).items():
-        yield Row([campaign.counted(title, counts)], 130 + _ROW_PX * len(counts))
+        yield Row([campaign.counted(title, counts)], counted_px(counts))
+
+
+def counted_px(counts: Mapping[str, object]) -> int:
+    """How high such bars are, so that each case has its name."""
+    return 130 + _ROW_PX * len(counts)
 
 
 def answers(result: Campaign) -> dict[str, dict[str, Counter[str]]]:
@@ -80,23 +118,25 @@ def answers(result: Campaign) -> dict[str, dict[str, Counter[str]]]:
         ("discover", "What was named", _named),
         ("compare", "What explains the residual first", _explained),
     ):
-        rows = [(row, answer(row)) for row in result.answers(kind)]
+        place = {group: at for at, group in enumerate(result.progress)}  # in the plan's order, not as they ended
+        ordered = sorted(result.answers(kind), key=lambda row: (place.get(row["group"], 0), row["case"]))
+        rows = [(row, answer(row)) for row in ordered]
         told = [(row, one) for row, one in rows if one is not None]
         often = {one for one, _ in Counter(one for _, one in told).most_common(_MOST_ANSWERS)}
         for row, one in told:
-            case = " · ".join(filter(None, (row["group"], row["case"])))
-            found.setdefault(title, {}).setdefault(case, Counter())[one if one in often else "another"] += 1
+            case = case_in_words(row["group"], row["case"])
+            found.setdefault(title, {}).setdefault(case, Counter())[one if one in often else _ANOTHER] += 1
     return found
 
 
 def _named(row: dict[str, Any]) -> str | None:
     if row["verdict"] is None:
         return None
-    return " + ".join(row["effects"]) or row["verdict"]
+    return " + ".join(map(effect_title, row["effects"])) or in_words(row["verdict"])
 
 
 def _explained(row: dict[str, Any]) -> str:
-    return f"{row['variable']} × {row['modulator']}" if row["variable"] else "nothing"
+    return explanation_title(row["variable"], row["modulator"])
 
 
 def _benchmarks(result: Campaign) -> Iterator[Piece]:
@@ -165,7 +205,7 @@ def effort(result: Campaign) -> Iterator[Piece]:
     seconds: dict[str, list[float]] = {}
     memory: dict[str, tuple[list[float], list[float]]] = {}
     for row in rows:
-        seconds.setdefault(row["group"], []).append(row["elapsed_s"])
+        seconds.setdefault(in_words(row["group"]), []).append(row["elapsed_s"])
         if row["memory_MB"] is not None:
             minutes, megabytes = memory.setdefault(row["worker"], ([], []))
             minutes.append((row["finished_s"] - rows[0]["finished_s"]) / 60.0)

@@ -25,7 +25,8 @@ _BAND = "rgba(47,111,222,0.18)"
 def magnitude(result: FrequencyResponse) -> go.Figure:
     """Measured with its 90 % band, the model's, and the functions whose resonance and delay are told."""
     shaded = ", shaded where both differ beyond the scatter" if result.differs else ""
-    figure = _new(f"Magnitude{shaded}", f"dB of {magnitude_unit(result)} [dB]")
+    unit = magnitude_unit(result)
+    figure = _new(f"Magnitude{shaded}", "Magnitude [dB]" if unit == "1" else f"Magnitude [dB of {unit}]")
     theme.shade(figure, [(one.from_Hz, one.to_Hz) for one in result.differs])
     for name, side, colour, dash in _sides(result):
         if name == "measured":

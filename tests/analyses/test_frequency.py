@@ -148,7 +148,7 @@ def test_its_json_form_is_its_schemas_and_leads_back(flexible):
 
 def test_it_shows_and_exports_itself(flexible, tmp_path):
     assert [figure.layout.yaxis.title.text for figure in flexible.figures()] == [
-        "dB of rad per A [dB]", "Phase [°]", "Coherence γ² [-]"
+        "Magnitude [dB of rad per A]", "Phase [°]", "Coherence γ² [-]"
     ]  # fmt: skip
     for suffix in (".json", ".csv", ".html", ".rrd"):
         flexible.export(tmp_path / f"found{suffix}")

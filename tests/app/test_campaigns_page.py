@@ -24,6 +24,7 @@ from emaviz.session.campaigns import REPORT, Campaigns
 from emaviz.session.data_folder import DataFolder
 from emaviz.session.explore import Session
 from emaviz.session.session_file import Part
+from emaviz.views.campaign import case_in_words
 
 GROUPS = """
 [groups.worn]
@@ -112,16 +113,33 @@ def test_a_row_opens_as_a_run_with_its_recording(session, data, kind):
         campaigns.open_row("campaigns/first", "nothing")
 
 
+@pytest.mark.parametrize(
+    ("group", "case", "told"),
+    [
+        ("cogging_torque", "cogging_torque 0.024", "cogging torque 24.0 mN·m"),
+        ("load_dependent_friction", "load_dependent_friction 0.15", "load-dependent friction 0.150"),
+        ("viscous_friction", "motor.viscous_friction_Nms_rad+0.00015", "motor viscous friction +0.000150 N·m·s/rad"),
+        ("mine", "step · hinge_moment 500", "mine · step · hinge moment 500 N·m/rad"),
+        ("worn", "k1=0.3", "worn · k1=0.3"),
+        ("nothing_hidden_step", "", "nothing hidden step"),
+    ],
+)
+def test_a_plans_cases_are_said_in_words_and_units(group, case, told):
+    assert case_in_words(group, case) == told
+
+
 def test_what_the_list_says_of_a_row(data):
     store = Store(data.folder / "campaigns" / "first")
     (row,) = store.table("identify").to_pylist()
     assert label(row, 1) == f"1 · Err {row['error_wrapped_percent']:.2f} % · k1=0.3 · seed 4"
     assert label(row | {"error": "broken"}, 2) == "2 · error · k1=0.3 · seed 4"
     (row,) = store.table("compare").to_pylist()
-    assert label(row | {"adequate": False, "variable": "load"}, 1) == "1 · load · seed 1"
+    by_speed = {"adequate": False, "variable": "motor_speed", "modulator": "sign_speed"}
+    assert label(row | by_speed, 1) == "1 · Motor speed × direction · seed 1"
+    assert label(row | by_speed | {"variable": None}, 1) == "1 · not adequate · seed 1"
     shown = tables(store)
     assert "A worn one" in progress_bars(store) and "1 of 1" in progress_bars(store)
-    assert [figure.layout.title.text for figure in figures(store)] == [
+    assert [figure.layout.title.text for figure, _ in figures(store)] == [
         "<b>Error of the identified k</b>",
         "<b>What explains the residual first</b>",
     ]

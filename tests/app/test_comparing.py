@@ -99,6 +99,18 @@ def heard(comparing):
     return Heard(comparing)
 
 
+def test_a_measurement_is_refused_by_its_name_in_the_data_folder(tmp_path):
+    session = Session(load_actuator(), tmp_path)
+    comparing = Comparing(session, DataFolder(tmp_path))
+    (comparing.folder.uploads / "broken.csv").write_text("time_s,current_A\n0,1\n0,2\nabc,3\n")
+    try:
+        with pytest.raises(InputError, match=r"^uploads/broken\.csv: line 4"):
+            comparing.measurement("uploads/broken.csv")
+    finally:
+        comparing.close()
+        session.close()
+
+
 def test_foreign_columns_wait_for_the_user_and_are_remembered(comparing, heard, recording):
     foreign_csv(recording, comparing.folder.uploads / "rig.csv")
     comparing.add("uploads/rig.csv")

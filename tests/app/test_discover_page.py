@@ -226,6 +226,9 @@ def test_an_effect_outside_the_library_becomes_an_expression_or_a_curve(discover
         errors_told.append(float(shown.inner_text().split("≈")[1].split()[0]))
     assert errors_told[0] < 1.1 < errors_told[1], "a slider shows at once what its value would do"
     wait_until(lambda: drawn(page, "User's torque and the residual") > 10)
+    wide = "one => one.scrollWidth - one.closest('.mantine-ScrollArea-viewport').clientWidth"
+    within = page.locator("[data-dock-region=left] .mantine-ScrollArea-content").locator("visible=true")
+    assert max(within.evaluate_all(f"all => all.map({wide})")) <= 0, "the figure does not widen the panel"
     folder.click()
     done(page, app)
     (effect,) = app.discovering.look.added

@@ -81,6 +81,14 @@ def test_of_many_discoveries_the_last_ones_are_whole(solved):
     assert entries.all[3].told is not None and entries.all[2].told is not None
 
 
+def test_a_session_that_is_loaded_where_it_was_saved_shows_it_at_once(solved):
+    path, before = solved.save(), solved.discovering.look
+    count = len(solved.discovering.entries.all)
+    solved.load(path)
+    assert solved.discovering.look is before and not solved.discovering.job.waiting
+    assert len(solved.discovering.entries.all) == count
+
+
 def ladder(rig):
     return [(one.change, one.rmse, one.holdout_rmse) for one in rig.discovering.look.found.ladder]
 

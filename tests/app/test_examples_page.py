@@ -6,6 +6,7 @@ import pytest
 from support.on_page import wait_until
 
 from emaviz.page.fleet import UnitsTab
+from emaviz.page.frequency import FrequencyTab
 from emaviz.page.track import TrackTab
 
 pytestmark = pytest.mark.browser
@@ -77,3 +78,18 @@ def test_the_example_of_compare_holds_one_out(page, app):
     page.locator(".emaviz-map:visible").wait_for()
     flow.get_by_role("link", name="2 Fit and regions").click()
     page.locator(".emaviz-map").wait_for(state="hidden")
+
+
+def test_the_example_of_bode_is_a_sweep_over_a_resonance(page, app):
+    comparing, analysing = app.comparing, app.tab(FrequencyTab).analysing
+    for name in list(comparing.opened):
+        comparing.remove(name)
+    example(page, "Bode").click()
+    wait_until(lambda: analysing.job.running)
+    page.locator(".emaviz-waits:visible").first.wait_for()
+    wait_until(lambda: analysing.result is not None)
+    page.get_by_text("The measured resonance lies at 65").locator("visible=true").first.wait_for()
+    assert list(analysing.result.recordings) == ["frequency-example"] and list(comparing.opened) == [
+        "uploads/frequency-example.parquet"
+    ]
+    assert not analysing.provenance.line("Frequency response"), "it is of what Compare has"

@@ -39,7 +39,7 @@ def test_what_runs_is_told_on_every_tab_and_what_comes_waits_in_line(page, app, 
     page.get_by_role("tab", name="Track", exact=True).click()
     choose(page, "Flights", f"unit ({COUNT})")
     page.get_by_role("button", name="Track", exact=True).click()
-    page.get_by_text(f"0 of {COUNT} flights are identified").wait_for()
+    page.get_by_text("The first are drawn as soon as they are identified.").locator("visible=true").wait_for()
     let_go.release(3)
     page.get_by_text(f"3 of {COUNT} flights are identified. A trend is looked for from 8 on.").wait_for()
     drawn = app.tab(TrackTab).result._so_far.figure

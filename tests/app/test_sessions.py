@@ -10,7 +10,7 @@ import zipfile
 
 import numpy as np
 import pytest
-from support.on_page import wait_until
+from support.on_page import choose, wait_until
 
 from ema_model.actuator import load_actuator
 from ema_model.commands import command
@@ -419,6 +419,19 @@ def test_a_session_is_saved_and_loaded_with_all_that_is_on_the_page(page, app, t
     kept = app.comparing.folder.sessions / "mine.emaviz"
     wait_until(kept.is_file)
     assert kept.read_bytes() == copy.read_bytes()
+
+    (app.comparing.folder.sessions / "damaged.emaviz").write_text("no session")  # comes beside, and is listed
+    page.get_by_role("tab", name="Explore", exact=True).click()
+    page.get_by_role("tab", name="Runs", exact=True).click()
+    assert page.get_by_label("Saved", exact=True).input_value() == "sessions/mine.emaviz"
+    choose(page, "Saved", "sessions/damaged.emaviz")
+    page.get_by_role("button", name="Load session").click()
+    refused = page.locator(".emaviz-beside", has_text="damaged.emaviz: is no session")
+    refused.wait_for()
+    panel = page.locator("[data-dock-region=left] .mantine-ScrollArea-viewport").locator("visible=true").first
+    seen, shown = refused.bounding_box(), panel.bounding_box()
+    assert seen["y"] + seen["height"] <= shown["y"] + shown["height"] + 1, "it is in sight"
+    choose(page, "Saved", "sessions/mine.emaviz")
 
     settings.restore(Settings().saved())
     app.comparing.calibrate = True

@@ -23,18 +23,29 @@ from support.browser import SOFTWARE_GL
 from support.on_page import choose, field, fill, wait_until
 
 from ema_model.faults import vector
-from emaviz.cli import main as emaviz
 from emaviz.page.app import App
 from emaviz.page.fleet import UnitsTab
 from emaviz.page.frequency import FrequencyTab
+from emaviz.page.identify.tab import IdentifyTab
+from emaviz.page.runs import RunsTab
 from emaviz.page.track import TrackTab
 
 WINDOWS = {1400: 900, 1920: 1080, 1100: 700}
-SETTLED_MS = 1800
+SETTLED_MS, QUICK_MS = 1800, 250
 LONG_MS = 900_000
 EXAMPLES = Path(__file__).parents[2] / "assets" / "examples"
 MOVES = ("running",)  # states that change by themselves
+INNER = "inner "  # begins the name of a tab within a result, which is taken in the middle window alone, too
+BROKEN = "time_s,current_A\n0,1\n0,2\nabc,3\n"
 CLOSE = ".mantine-Notification-closeButton"
+
+
+def inner(page: Any, *titles: str) -> Iterator[str]:
+    """Tabs within a result, one after another."""
+    for title in titles:
+        page.get_by_role("tab", name=title, exact=True).locator("visible=true").click()
+        page.wait_for_timeout(2000)
+        yield f"{INNER}{title.lower()}"
 
 
 def explore(page: Any, app: App, _: Path) -> Iterator[str]:
@@ -48,26 +59,45 @@ def explore(page: Any, app: App, _: Path) -> Iterator[str]:
     page.wait_for_timeout(3000)
     app.strip.rest_at(0.25, "explore")
     yield "result"
+    yield from inner(page, "Phases", "Fan", "Metrics", "Export")
 
 
-def identify(page: Any, app: App, _: Path) -> Iterator[str]:
+def identify(page: Any, app: App, folder: Path) -> Iterator[str]:
     """What Explore breaks."""
     yield "empty"
     app.session.settings.set("k", list(vector({"k1": 0.25, "k2": 0.7, "k3": 0.3, "k6": 0.5})))
     app.session.refresh()
+    search = {"algorithms": ["do", "hba", "ssa"], "population": 400, "iterations": 2000}
+    usual = {name: getattr(app.session.settings, name) for name in search}
+    for name, value in search.items():
+        app.session.settings.set(name, value)
+    app.tab(IdentifyTab).show_settings()
     page.get_by_role("button", name="Identify", exact=True).click()
     wait_until(lambda: app.session.identifying.job.running)
     page.wait_for_timeout(1500)
     yield "running"
+    app.session.identifying.job.stop()
+    wait_until(lambda: not app.session.identifying.job.running)
+    for name, value in usual.items():
+        app.session.settings.set(name, value)
+    app.tab(IdentifyTab).show_settings()
+    page.get_by_role("button", name="Identify", exact=True).click()
     page.get_by_role("link", name="in Rerun").wait_for(timeout=LONG_MS)
     yield "result"
+    yield from inner(page, "Search", "Landscape", "History")
+    (folder / "data" / "broken.csv").write_text(BROKEN)
+    app.tab(IdentifyTab).refresh_files()
+    choose(page, "Identify", "broken.csv")
+    page.get_by_role("button", name="Identify", exact=True).click()
+    page.wait_for_timeout(2000)
+    yield "error"
 
 
 def compare(page: Any, app: App, folder: Path) -> Iterator[str]:
     """A foreign file's columns, what is no recording, and the example."""
     yield "empty"
     shutil.copy(EXAMPLES / "rig.csv", folder / "data" / "rig.csv")
-    (folder / "data" / "broken.csv").write_text("time_s,current_A\n0,1\n0,2\nabc,3\n")
+    (folder / "data" / "broken.csv").write_text(BROKEN)
     app.comparing.add("broken.csv")
     page.wait_for_timeout(2000)
     yield "error"
@@ -79,13 +109,13 @@ def compare(page: Any, app: App, folder: Path) -> Iterator[str]:
     app.comparing.remove("rig.csv")
     page.locator("button:visible", has_text="Run an example").click()
     wait_until(lambda: app.comparing.running)
-    page.wait_for_timeout(1000)
     yield "running"
     wait_until(lambda: app.comparing.finished is not None and not app.comparing.running)
     yield "result"
     page.get_by_role("button", name="The motor needs").first.click(timeout=10_000)
     page.wait_for_timeout(2000)
     yield "region"
+    yield from inner(page, "Against", "Orders", "Explained by", "Calibration")
 
 
 def discover(page: Any, app: App, _: Path) -> Iterator[str]:
@@ -116,6 +146,9 @@ def discover(page: Any, app: App, _: Path) -> Iterator[str]:
     page.get_by_text("With these values, before any fit").wait_for()
     page.get_by_role("button", name="Fit it in the model").scroll_into_view_if_needed()
     yield "own"
+    field(page, "T [N·m] =").fill("-c*sgn(omega")
+    page.wait_for_timeout(1000)
+    yield "error"
 
 
 def units(page: Any, app: App, _: Path) -> Iterator[str]:
@@ -134,10 +167,19 @@ def units(page: Any, app: App, _: Path) -> Iterator[str]:
     yield "error"
 
 
-def track(page: Any, app: App, _: Path) -> Iterator[str]:
+def track(page: Any, app: App, folder: Path) -> Iterator[str]:
     """A life."""
     job = app.tab(TrackTab).following.job
     yield "empty"
+    flights = folder / "data" / "flights"
+    flights.mkdir()
+    for day in (1, 2, 3):
+        (flights / f"flight {day}.csv").write_text(BROKEN)
+    app.tab(TrackTab).refresh_files()
+    choose(page, "Flights", "flights (3)")
+    page.get_by_role("button", name="Track", exact=True).click()
+    page.wait_for_timeout(4000)
+    yield "error"
     page.locator("button:visible", has_text="Run an example").click()
     wait_until(lambda: job.running)
     page.wait_for_timeout(30_000)
@@ -146,24 +188,18 @@ def track(page: Any, app: App, _: Path) -> Iterator[str]:
     yield "result"
 
 
-def bode(page: Any, app: App, folder: Path) -> Iterator[str]:
+def bode(page: Any, app: App, _: Path) -> Iterator[str]:
     """A sweep over a resonance."""
     yield "empty"
     page.get_by_role("button", name="Frequency response").click()
     page.get_by_text("no measurement is chosen").first.wait_for()
     yield "error"
-    sweep = "simulate --command chirp --set end_Hz=100 --set end_time_s=6 --set amplitude_rad=0.002 --duration 6"
-    effect = "--noise-current 0.1 --effect torsional_compliance --out"
-    emaviz([*sweep.split(), *effect.split(), str(folder / "data" / "sweep.csv")])
-    app.comparing.add("sweep.csv")
-    wait_until(lambda: "sweep.csv" in app.comparing.opened)
-    app.comparing.job.stop()
-    job = app.tab(FrequencyTab).analysing.job
-    wait_until(lambda: not app.session.worker.busy)
-    page.get_by_role("button", name="Frequency response").click()
-    wait_until(lambda: job.running)
+    analysing = app.tab(FrequencyTab).analysing
+    page.locator("button:visible", has_text="Run an example").click()
+    wait_until(lambda: analysing.job.running)
     yield "running"
-    wait_until(lambda: not job.running)
+    wait_until(lambda: analysing.result is not None)
+    page.wait_for_timeout(2000)
     yield "result"
 
 
@@ -175,9 +211,15 @@ def library(page: Any, app: App, _: Path) -> Iterator[str]:
     yield "result"
 
 
-def runs(page: Any, app: App, _: Path) -> Iterator[str]:
+def runs(page: Any, app: App, folder: Path) -> Iterator[str]:
     """A run that is recorded, the viewer, and a campaign."""
     yield "empty"
+    (folder / "data" / "sessions" / "damaged.emaviz").write_text(BROKEN)
+    app.tab(RunsTab).refresh_files()
+    page.wait_for_timeout(1000)
+    page.get_by_role("button", name="Load session").click()
+    page.wait_for_timeout(2000)
+    yield "error"
     page.locator("button:visible", has_text="Run an example").click()
     identifying = app.session.identifying
     wait_until(lambda: identifying.job.running)
@@ -206,15 +248,16 @@ TABS: dict[str, Callable[[Any, App, Path], Iterator[str]]] = {
 def photograph(page: Any, app: App, to: Path, named: str, state: str) -> None:
     """One state, in its windows and both looks."""
     for width, height in WINDOWS.items():
-        if state in MOVES and width != min(WINDOWS, key=lambda px: abs(px - 1400)):
+        if width != 1400 and (state in MOVES or state.startswith(INNER)):
             continue
         page.set_viewport_size({"width": width, "height": height})
-        page.wait_for_timeout(SETTLED_MS)
+        settled = QUICK_MS if state in MOVES else SETTLED_MS
+        page.wait_for_timeout(settled)
         page.evaluate(f"document.querySelectorAll('{CLOSE}').forEach(one => one.click())")
         for dark in (False, True):
             app.strip._dark.value = dark
             page.mouse.move(width // 2, 5)
-            page.wait_for_timeout(SETTLED_MS)
+            page.wait_for_timeout(settled)
             page.screenshot(path=to / f"{named}-{state}-{width}-{'dark' if dark else 'light'}.png")
     app.strip._dark.value = False
     page.set_viewport_size({"width": 1400, "height": 900})

@@ -1,8 +1,8 @@
 """What grows while somebody works: python tests/benchmarks/soak.py [ROUNDS]
 
 Each round moves sliders and goes to another tab; every fifth one identifies and records, every tenth one compares a
-recording, every twentieth one discovers, saves the session and loads it.  Memory of the app and of the browser's page,
-threads and open files are told each twenty rounds, with the kinds of objects that have become more.
+recording, discovers, saves the session and loads it.  Memory of the app and of the browser's page, threads and open
+files are told each ten rounds, with the kinds of objects that have become more.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ from emaviz.page.app import App
 BENCH = "bench.csv"  # of which a ripple is missing in the model
 TABS = ("Explore", "Identify", "Compare", "Discover", "Units", "Track", "Bode", "Library", "Runs")
 CHALLENGE = "first_bench_run"
-TOLD_EACH, SHOWN = 20, 6
+TOLD_EACH, SHOWN = 10, 6
 
 
 def round_of(app: App, page: Any, number: int) -> None:
@@ -53,13 +53,13 @@ def round_of(app: App, page: Any, number: int) -> None:
         app.comparing.compare()
         rest(app)
         app.comparing.remove(BENCH)
-    if number % 20 == 17:
+    if number % 10 == 7:
         app.discovering.source.choose(CHALLENGE)
         app.discovering.start()
         rest(app)
         app.discovering.add(app.discovering.look.promising[0].name)
         rest(app)
-    if number % 20 == 19:
+    if number % 10 == 9:
         page.get_by_role("tab", name="Runs", exact=True).click()
         for name in ("Save session", "Load session"):
             page.get_by_role("button", name=name).click()

@@ -12,6 +12,7 @@ import pyarrow as pa
 from ema_model.campaign.kinds.kind import FLAG, NUMBER, NUMBERS, TEXT, Kind
 from ema_model.campaign.plan_axes import TaskInputs
 from ema_model.comparison import compare
+from ema_model.quantities.variables import explanation_title
 
 
 @dataclass(frozen=True)
@@ -42,7 +43,7 @@ def _run(inputs: TaskInputs, settings: Settings, seed: int) -> dict[str, Any]:
 
 
 def _told(rows: list[dict[str, Any]]) -> dict[str, Any]:
-    first = Counter(f"{row['variable']} × {row['modulator']}" if row["variable"] else "nothing" for row in rows)
+    first = Counter(explanation_title(row["variable"], row["modulator"]) for row in rows)
     orders = Counter(f"{row['orders'][0]:g}" for row in rows if row["orders"])
     return {
         "adequate": sum(row["adequate"] for row in rows),

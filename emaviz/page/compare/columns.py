@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from itertools import pairwise
@@ -32,6 +33,7 @@ from emaviz.text.html import Html, add_html, html, joined, unescaped
 
 _MOST_COLUMNS = 200
 _WIDE_PX, _HIGH_PX, _BINS = 220, 34, 110  # of a column's drawing, and how many parts it has, each from min to max
+_BEFORE_UNIT = re.compile(r"(?=[\[(])")
 _SURE, _UNSURE = 0.8, 0.6
 _BETWEEN = "|"  # after it stands the time, so that the same edit twice is another text
 _SCRIPT = """
@@ -65,6 +67,7 @@ _STYLE = unescaped(
     "<style>.emaviz-map{width:100%;border-collapse:collapse;font-size:12.5px;line-height:1.3}"
     ".emaviz-map th{text-align:left;font-weight:400;opacity:.65;padding:2px 8px}"
     ".emaviz-map td{padding:3px 8px;border-top:1px solid rgba(134,142,150,.3);overflow-wrap:anywhere}"
+    ".emaviz-map td:first-child{min-width:7.5em}"
     ".emaviz-map .aside td:not(:nth-child(3)){opacity:.6}"
     ".emaviz-map :is(select,input){font:inherit;color:inherit;background:var(--mantine-color-body);height:26px;"
     "border:1px solid rgba(134,142,150,.6);border-radius:4px;padding:0 4px;max-width:100%}"
@@ -156,13 +159,18 @@ def _row(place: int, name: str, drawing: Html, entry: MappedColumn | None, why: 
         "<td>{}</td></tr>",
         place,
         classes,
-        name,
+        _broken(name),
         "" if entry is None else html("<br><small>{}</small>", done(entry)) if done(entry) else "",
         html('<button data-do="plot" title="Draws {} below">{}</button>', name, drawing),
         _select("signal", _quantities(), "" if entry is None else entry.signal, f"What {name} is"),
         *fields,
         html('<span class="why" style="opacity:.8">{}</span>', why) if entry is None else _sure(entry),
     )
+
+
+def _broken(name: str) -> Html:
+    """A column's name, whose lines end before its unit rather than within it."""
+    return joined(_BEFORE_UNIT.split(name), "<wbr>")
 
 
 def _fields(entry: MappedColumn | None) -> tuple[Html, Html, Html]:

@@ -140,6 +140,7 @@ CARDS = unescaped(
     "font-weight:600}.emaviz-card button:disabled{opacity:.45;cursor:default}"
     f".emaviz-card .alike{{color:{COLOURS['warning']}}}"
     ".emaviz-sketch{margin:0;display:flex;flex-direction:column;min-width:0}.emaviz-sketch svg{width:100%;height:auto}"
+    ".emaviz-sketch span{white-space:nowrap}"
     ".emaviz-sketch small{font-size:11px;line-height:1.25;opacity:.75}"
     "</style>"
 )

@@ -268,10 +268,11 @@ def _slope(measurement: Measurement, position: Array, at: int, least_s: float = 
     moving = 0.0
     while samples >= _OF_A_LINE:
         halves = slice(samples), slice(samples, 2 * samples)
-        (early, error), (late, _) = (_line(time[half], position[half]) for half in halves)
+        (early, error), (late, other) = (_line(time[half], position[half]) for half in halves)
         if abs(early) <= _SURELY * error:
             break
-        if late == 0.0 or not _STEADY < early / late < 1.0 / _STEADY:
+        is_steady = late != 0.0 and _STEADY < early / late < 1.0 / _STEADY
+        if not is_steady and (not moving or abs(early - late) > _SURELY * math.hypot(error, other)):
             return 0.0
         moving = moving or 1.5 * early - 0.5 * late
         samples //= 2

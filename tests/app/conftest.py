@@ -94,7 +94,7 @@ def computed(monkeypatch: pytest.MonkeyPatch) -> list[str]:
         plain = getattr(module, name)
         monkeypatch.setattr(module, name, lambda *given, **more: calls.append(name) or plain(*given, **more))
 
-    for name in ("traced", "simulate_reference", "simulate_references", "own_stack", "stack_at_hand"):
+    for name in ("traced", "simulate_references", "own_stack", "stack_at_hand"):
         watch(closed_loop, name)
     for name in ("needed_currents", "stack_at_hand"):
         watch(inverse_dynamics, name)

@@ -177,7 +177,7 @@ def drawn(store):
     """All that the page draws of a campaign."""
     rows = [store.table(kind, how=True).to_pylist() for kind in store.header.kinds.values()]
     labels = [label(row, number) for one in rows for number, row in enumerate(one)]
-    pictures = [figure.to_json() for figure in figures(store)]
+    pictures = [figure.to_json() for figure, _ in figures(store)]
     return [str(progress_bars(store)), str(tables(store)), pictures, labels, Campaign(store).document.text, rows]
 
 

@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import os
 import re
 import shutil
-import subprocess
 import sys
 from collections.abc import Sequence
 from pathlib import Path
@@ -13,7 +11,6 @@ from pathlib import Path
 import numpy as np
 import pyarrow.parquet as pq
 import pytest
-from support.documents import result_of
 
 import ema_model
 from ema_model.actuator import load_actuator
@@ -160,27 +157,6 @@ def test_the_easy_one_is_solved():
     assert settings["order"] == hidden["order"]
     assert settings["amplitude_Nm"] == pytest.approx(hidden["amplitude_Nm"], rel=0.2)
     assert found.ladder[-1].rmse < 1.1 and found.ladder[-1].holdout_rmse < 1.1
-
-
-@pytest.mark.long
-def test_the_readme_shows_what_discovery_says(tmp_path):
-    """The ladder and the names of its example, as somebody meets it who tries it.
-
-    With the same kernels of OpenBLAS on every processor: by its own the calibration ends elsewhere on a flat ridge, and
-    with it the floor of a model that is far from it (3.25 to 3.51 at first, 1.03 to 1.06 at last, by four kinds).
-    """
-    one, out = ALL["after_the_overhaul"], tmp_path / "found.json"
-    files = [*one.training, "--holdout", *one.holdout, "--json", out]
-    same = os.environ | {"OPENBLAS_CORETYPE": "Haswell", "OPENBLAS_NUM_THREADS": "1"}
-    subprocess.run([sys.executable, "-m", "emaviz", "discover", *map(str, files)], check=True, env=same)
-    found = result_of(out, "discover")
-    readme = (Path(__file__).parents[2] / "README.md").read_text(encoding="utf-8")
-    [table] = re.findall(r"^error ladder.*\n((?:  .*\n)+)", readme, re.M)
-    shown = [re.split(r"\s{2,}", line.strip(" +")) for line in table.splitlines()]
-    titles = ["Calibrated", *(CATALOGUE[effect["name"]].title for effect in found["effects"])]
-    assert [title for title, *_ in shown] == titles
-    for (title, *numbers), rung in zip(shown, found["ladder"], strict=True):
-        assert [float(one) for one in numbers] == pytest.approx([rung["rmse"], rung["holdout_rmse"]], rel=0.01), title
 
 
 @pytest.mark.long

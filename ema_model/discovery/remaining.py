@@ -24,7 +24,7 @@ from ema_model.comparison.explain import orders as orders_of
 from ema_model.comparison.regions import Event, events
 from ema_model.comparison.residuals import Residuals, residuals_of
 from ema_model.comparison.verdict import ORDER_OF_PRIMARY, lasting, most_of_floor
-from ema_model.estimation.floor import as_it_is, silent
+from ema_model.estimation.floor import silent
 from ema_model.estimation.model_fit import Data, Fit, floor_ratio
 from ema_model.remembered import remembered
 
@@ -132,7 +132,7 @@ def left_by(data: Data, found: Fit) -> Left:
 @lru_cache(maxsize=4)  # of a fit and of the one before it
 def residuals_left(data: Data, found: Fit) -> Residuals:
     """The residuals of a fit beside the variables that may explain them."""
-    return _residuals(data, found, [as_it_is(draws) for draws in found.twins])
+    return _residuals(data, found, found.twins)
 
 
 def _residuals(data: Data, found: Fit, known: Sequence[dict[str, Array]]) -> Residuals:

@@ -264,7 +264,7 @@ def twin_error(model: Model, place: int, actuator: Actuator | None = None, k: Ar
 
 def as_it_is(draws: Signals) -> Signals:
     """Of `twin_error`, the draw of the actuator as it is: (blocks,) each."""
-    return {name: values[0] for name, values in draws.items()}
+    return {name: values[0].copy() for name, values in draws.items()}
 
 
 def repeats_of(window: Window, noise: Mapping[str, float]) -> Array:

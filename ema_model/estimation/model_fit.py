@@ -14,7 +14,7 @@ from ema_model.actuator import Actuator, Tolerance
 from ema_model.effects import find
 from ema_model.effects.effect import ANGLES
 from ema_model.estimation import Calibration, Floor, after_fit, calibrate, default_free, floor, of_unseen, taken_up
-from ema_model.estimation.floor import band, least, spread, twin_error
+from ema_model.estimation.floor import as_it_is, band, least, spread, twin_error
 from ema_model.estimation.problem import fitted_signals
 from ema_model.models import Model, model_for
 from ema_model.models.model import Signals
@@ -143,9 +143,15 @@ class Fit:
 
     @cached_property
     def twins(self) -> Sequence[Signals]:
-        """As of `twin_error`, by window."""
+        """Of `draws`, that of the actuator as it is, by window."""
+        return [as_it_is(one) for one in self.draws()]
+
+    def draws(self) -> Sequence[Signals]:
+        """As of `twin_error`, by window; all of them are too large to be kept."""
         fitted, k = self.calibration.actuator, self.calibration.k
-        return [twin_error(self.plant, place, fitted, k) for place in range(len(self.plant.windows))]
+        found = [twin_error(self.plant, place, fitted, k) for place in range(len(self.plant.windows))]
+        vars(self).setdefault("twins", [as_it_is(one) for one in found])
+        return found
 
     @property
     def residual(self) -> Array:
@@ -181,7 +187,7 @@ def gather(
 
 def in_floors_of(found: Fit, data: Data, held: Data | None) -> tuple[Data, Data | None]:
     """Data, and held-out ones, whose errors are told in what a true model leaves that was fitted as this one."""
-    calibration, twins = found.calibration, found.twins
+    calibration, twins = found.calibration, found.draws()
     taken = taken_up(data.floors, calibration, twins)
     data = replace(data, after_fit=after_fit(data.floors, calibration, twins, taken))
     if held is None:

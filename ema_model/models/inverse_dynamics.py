@@ -29,6 +29,7 @@ from ema_model.stacks import Stack
 
 Array = NDArray[np.float64]
 
+_NO_MOTION = 1e-300  # rad²/s⁴
 _CHUNK = 100_000  # samples that are computed at once
 # Times what filtering a speed once more changes, that it is off by where the motor turns round and may stand a while:
 # clean plants of another simulator (`tests/benchmarks/mujoco_plants.py`) leave 0.9 to 1.1 floors with it, 1.0 to 1.6
@@ -109,10 +110,14 @@ class InverseDynamics:
         actuator = (actuator or self.actuator).varied(window.values)
         k = np.atleast_2d(np.asarray(actuator.k if k is None else k, dtype=float))
         rows = monitor_rows(actuator, k, self.stack, self.effects if effects is None else effects)
-        # Effects see the angle as it was read; the acceleration's own part has passed the filter already.
-        static = self._currents(rows, len(k), window, np.zeros_like(window.position))
-        moving = self._currents(rows, len(k), window, window.motion.acceleration)
-        needed = window.motion.filtered(static) + moving - static + _of_loop(actuator) * window.motion.acceleration
+        # Effects see the angle as it was read. What goes with the acceleration alone has passed the filter already;
+        # what of it changes as fast as an angle's ripple, or with the direction, has not.
+        acceleration = window.motion.acceleration
+        static = self._currents(rows, len(k), window, np.zeros_like(acceleration))
+        moving = self._currents(rows, len(k), window, acceleration)
+        squared = max(float(np.sum(acceleration**2)), _NO_MOTION)
+        even = np.sum((moving - static) * acceleration, axis=1, keepdims=True) / squared * acceleration
+        needed = window.motion.filtered(moving - even) + even + _of_loop(actuator) * acceleration
         needed = later(needed, _each(actuator.sensors.delay_s), window.period_s, smooth=True)
         current = _by_block(needed, window)
         sensors = actuator.sensors

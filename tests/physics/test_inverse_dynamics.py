@@ -184,3 +184,11 @@ def test_a_command_exceeds_its_current_by_an_apparent_inertia(tmp_path):
         error(InverseDynamics([command], motor(tmp_path, f"{ahead}apparent_inertia = {one}\n"))) for one in (0.0, share)
     ]
     assert share > 0.02 and left[1] < 0.05 * left[0]
+
+
+def test_a_ripple_of_the_torque_passes_the_filter_while_the_motor_speeds_up(tmp_path):
+    """I = T / {k_t [1 + a cos(h θ + φ)]}: faster than the filter, it is as little in the model as in the current."""
+    plain, ripple = spin(), {"torque_ripple": {"ratio": 0.1, "order": 13.0, "phase_rad": 0.4}}
+    waves = 1.0 + 0.1 * np.cos(13.0 * plain["motor_position_rad"] + 0.4)
+    plant = InverseDynamics([plain.with_signals(current_A=plain["current_A"] / waves)], motor(tmp_path), effects=ripple)
+    assert error(plant) < 3e-3 * np.sqrt(np.mean(plain["current_A"] ** 2))

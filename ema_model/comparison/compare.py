@@ -21,7 +21,7 @@ from ema_model.effects import find
 from ema_model.errors import InputError, did_you_mean, quoted
 from ema_model.estimation import Calibration, Floor, after_fit, floor, of_unseen, taken_up
 from ema_model.estimation import calibrate as fit
-from ema_model.estimation.floor import as_it_is, band, least, spread, tells_nothing, twin_error
+from ema_model.estimation.floor import as_it_is, band, least, spread, tells_nothing, twin_errors
 from ema_model.estimation.problem import SIGNALS
 from ema_model.faults import checked, named
 from ema_model.models import Model, Window, model_for
@@ -105,7 +105,7 @@ def _compare(
         on_progress=lambda evaluations: tell(f"calibrating (simulations: {evaluations})"),
     )
     tell("looking where it fails")
-    twins = [twin_error(fitted, i, calibration.actuator, calibration.k) for i in range(len(fitted.windows))]
+    twins = twin_errors(fitted, calibration.actuator, calibration.k)
     taken = taken_up(floors, calibration, twins)
     if elsewhere is None:
         floors = after_fit(floors, calibration, twins, taken)

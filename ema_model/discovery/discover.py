@@ -108,7 +108,7 @@ def result_of(
         calibration=calibration,
         effects=named,
         ladder=story.ladder,
-        candidates=_as_named(candidates, named),
+        candidates=_as_named(candidates, [*named, *freed]),
         faults=faults,
         parameters_outside_tolerance=list(dict.fromkeys([*(one.stands_for for one in freed), *outside])),
         actuator=calibration.actuator,

@@ -468,7 +468,7 @@ class Discovery(Result):
     @property
     def ranked(self) -> list[Candidate]:
         """Best first: by how probable they are, what is named before its rivals; then by their fall; obstacles last."""
-        named = {one.name for one in self.effects}
+        named = {one.name for one in (*self.effects, *self.freed)}
         return sorted(
             self.candidates,
             key=lambda one: (

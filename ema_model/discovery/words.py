@@ -355,7 +355,7 @@ def candidates(found: Discovery) -> Table | None:
         ]
         for one in found.ranked
     ]
-    alike = {rival: one.name for one in found.effects for rival in one.same_as}
+    alike = {rival: one.name for one in (*found.effects, *found.freed) for rival in one.same_as}
     remarks = [
         f"or {in_sentence(effect_title(alike[one.name]))}: not told apart" if one.name in alike else one.obstacle
         for one in found.ranked
@@ -639,7 +639,7 @@ def sentences(found: Discovery) -> list[str]:
         if one.same_as:
             title = in_sentence(on_axes(one.stands_for, found.actuator.axes).title)
             rivals = all_of([in_sentence(effect_title(name)) for name in one.same_as])
-            told.append(f"These recordings cannot tell another {title} from {rivals}.")
+            told.append(f"These recordings cannot tell a different {title} from {rivals}.")
     told += moved(found)
     if found.unknown is not None:
         told.append(("Something else is left. " if found.effects else "") + found.unknown.sentence)

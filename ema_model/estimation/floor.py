@@ -238,9 +238,8 @@ def floor(
 def local_rms(values: Array, block_s: float) -> Array:
     """Over 12.5 ms on either side, and over draws where there are some: (blocks,) or (draws, blocks) → (blocks,)."""
     width = max(3, round(CORRELATED_S / block_s) | 1)
-    return np.sqrt(
-        np.maximum(uniform_filter1d(np.mean(np.atleast_2d(values) ** 2, axis=0), width, mode="nearest"), 0.0)
-    )
+    squares = np.mean(np.atleast_2d(values) ** 2, axis=0)
+    return np.sqrt(np.maximum(uniform_filter1d(squares, width, mode="nearest"), 0.0))
 
 
 def _of_sensors(noise: float, draws: Array) -> float:
@@ -260,6 +259,11 @@ def twin_error(model: Model, place: int, actuator: Actuator | None = None, k: Ar
     twins = model.twins(place, drawn, faults)
     own = model.signals(place, drawn, faults, even=True) if twins else {}
     return {name: values - own[name] for name, values in twins.items()}
+
+
+def twin_errors(model: Model, actuator: Actuator | None = None, k: ArrayLike | None = None) -> list[Signals]:
+    """`twin_error` of each of a model's windows."""
+    return [twin_error(model, place, actuator, k) for place in range(len(model.windows))]
 
 
 def as_it_is(draws: Signals) -> Signals:

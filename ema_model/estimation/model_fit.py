@@ -14,7 +14,7 @@ from ema_model.actuator import Actuator, Tolerance
 from ema_model.effects import find
 from ema_model.effects.effect import ANGLES
 from ema_model.estimation import Calibration, Floor, after_fit, calibrate, default_free, floor, of_unseen, taken_up
-from ema_model.estimation.floor import as_it_is, band, least, spread, twin_error
+from ema_model.estimation.floor import as_it_is, band, least, spread, twin_errors
 from ema_model.estimation.problem import fitted_signals
 from ema_model.models import Model, model_for
 from ema_model.models.model import Signals
@@ -148,8 +148,7 @@ class Fit:
 
     def draws(self) -> Sequence[Signals]:
         """As of `twin_error`, by window; all of them are too large to be kept."""
-        fitted, k = self.calibration.actuator, self.calibration.k
-        found = [twin_error(self.plant, place, fitted, k) for place in range(len(self.plant.windows))]
+        found = twin_errors(self.plant, self.calibration.actuator, self.calibration.k)
         vars(self).setdefault("twins", [as_it_is(one) for one in found])
         return found
 
@@ -193,7 +192,7 @@ def in_floors_of(found: Fit, data: Data, held: Data | None) -> tuple[Data, Data 
     if held is None:
         return data, None
     plant = held.plant(calibration.actuator)
-    there = [twin_error(plant, place) for place in range(len(plant.windows))]
+    there = twin_errors(plant)
     unseen = of_unseen(plant, held.floors, calibration, taken, there, held.signals)
     return data, replace(held, after_fit=unseen)
 
@@ -262,14 +261,14 @@ def fit(
     return Fit(actuator, plant, calibration, starts, faults, held)
 
 
-def multiplied(actuator: Actuator) -> dict[str, str]:
-    """Paths of base parameters that effects multiply whose first parameter is free, and those effects' keys."""
-    found: dict[str, str] = {}
+def multiplied(actuator: Actuator) -> set[str]:
+    """Paths of base parameters that effects multiply whose first parameter is free."""
+    found: set[str] = set()
     for key in actuator.effects:
         effect = find(key, actuator.axes)
         own = actuator.tolerances.get(f"effects.{key}.{effect.parameters[0].name}")
         if effect.scale and own is not None and own.free:
-            found[effect.duplicates] = key
+            found.add(effect.duplicates)
     return found
 
 

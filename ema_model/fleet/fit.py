@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from scipy.special import stdtrit
 
 from ema_model.estimation import Calibration, Floor, after_fit, calibrate
-from ema_model.estimation.floor import twin_error
+from ema_model.estimation.floor import twin_errors
 from ema_model.fleet.block import WIDER, Candidate, Linearised, Unit, colour_of, linearised, pooled
 from ema_model.fleet.criteria import FALSE
 from ema_model.fleet.pool import Pool
@@ -220,8 +220,7 @@ class Fitted:
     def floors(self) -> list[Floor]:
         """What a true model leaves once it is fitted."""
         model, found = self.unit.model, self.calibration
-        twins = [twin_error(model, place, found.actuator, found.k) for place in range(len(model.windows))]
-        return after_fit(self.unit.floors, found, twins)
+        return after_fit(self.unit.floors, found, twin_errors(model, found.actuator, found.k))
 
     def over_floor(self, residuals: Array) -> Array:
         """rms of what models leave of the unit's recordings, (…, values) as fits weigh it, in its floors, (…,)."""

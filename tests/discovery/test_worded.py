@@ -23,6 +23,7 @@ from ema_model.discovery.words import (
 )
 from ema_model.estimation import Calibrated
 from ema_model.quantities.axes import ROTARY, Axes
+from ema_model.quantities.titles import in_sentence
 from emaviz.views.export import export
 
 RAW = re.compile(r"[a-z]+\.[a-z_]+_|cogging_torque|torque_ripple|_Nm|_A\b")
@@ -81,6 +82,14 @@ def test_a_parameter_that_an_effect_takes_beyond_its_tolerance_is_told_by_the_ef
     )
     assert "Outside its tolerance: motor viscous friction." in sentences(told)
     assert [facts.title for facts in words.added(told)] == [facts.title for facts in words.added(found)]
+    rival = next(other.name for other in found.candidates if other.name != one.name)
+    rivalled = replace(told, freed=[replace(one, stands_for=path, same_as=(rival,))])
+    alike = f"cannot tell a different motor viscous friction from {in_sentence(effect_title(rival))}."
+    assert any(alike in sentence for sentence in sentences(rivalled))
+    table = words.candidates(rivalled)
+    assert table is not None
+    remarks = {row[0]: remark for row, remark in zip(table.rows, table.remarks)}
+    assert remarks[effect_title(rival)] == f"or {in_sentence(effect_title(one.name))}: not told apart"
 
 
 def test_orders_along_a_linear_motor_are_pitches():

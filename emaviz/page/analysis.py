@@ -181,8 +181,7 @@ class AnalysisPanel:
     def _forget_errors(self) -> None:
         """What was said of recordings that are not chosen any more."""
         self._page.say_beside(self._start, "")
-        if not self._analysing.job.running:
-            self._line.say("")
+        self._line.forget_refusal()
 
     def _busy(self, busy: bool) -> None:
         with self._page.server.atomic():

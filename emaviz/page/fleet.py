@@ -240,8 +240,7 @@ class UnitsPanel:
     def _forget_errors(self) -> None:
         """What was said of units that are not chosen any more."""
         self._page.say_beside(self._start, "")
-        if not self._comparing.job.running:
-            self._line.say("")
+        self._line.forget_refusal()
 
     def _busy(self, busy: bool) -> None:
         self._result.busy(busy)

@@ -77,7 +77,7 @@ class JobLine:
         page.job_tabs[job] = at.name
         self._page, self._job, self._pauses = page, job, pauses
         self._title = self._waited = ""
-        self._stopping = False
+        self._stopping = self._refuses = False
         gui = page.server.gui
         self._pause = gui.add_button(
             f"Pause {pauses}", icon=viser.Icon.PLAYER_PAUSE, color="gray", visible=False, disabled=not pauses
@@ -95,9 +95,15 @@ class JobLine:
         job.rests.connect(lambda rests: post(f"{self._name} is paused", lambda: self._show_paused(rests)))
         job.ended.connect(lambda text: post(self._name, lambda: self._ended(text)))
 
-    def say(self, text: str) -> None:
-        """On the screen's thread."""
+    def say(self, text: str, *, refuses: bool = False) -> None:
+        """On the screen's thread; refuses: it says what is wrong with what is chosen, until something else is."""
+        self._refuses = refuses
         self._text.content = boxed(text if isinstance(text, Html) else begun(self._page.local(text))) if text else ""
+
+    def forget_refusal(self) -> None:
+        """What was wrong is not chosen any more; whatever else is said stays."""
+        if self._refuses:
+            self.say("")
 
     def _waits(self, text: str) -> None:
         """For its turn, and can be stopped before that has come; or, with no text, does not wait any more."""
@@ -145,7 +151,8 @@ class JobLine:
     def _ended(self, text: str) -> None:
         with self._page.server.atomic():
             self._stop.visible = self._pause.visible = self._bar.visible = False
-            self.say(warned([self._job.error]) if self._job.error and not text else text)
+            failed = bool(self._job.error and not text)
+            self.say(warned([self._job.error]) if failed else text, refuses=failed)
 
 
 # --- a dropdown of the data folder's folders, read anew whenever its tab is entered -----------------------------------

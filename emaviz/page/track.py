@@ -488,8 +488,7 @@ class TrackPanel:
         """What was said of flights that are not there any more."""
         self._page.say_beside(self._start, "")
         self._show_left_out()
-        if not self._following.job.running:
-            self._line.say("")
+        self._line.forget_refusal()
 
     def _busy(self, busy: bool) -> None:
         self._result.busy(busy)

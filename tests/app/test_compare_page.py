@@ -413,3 +413,15 @@ def test_a_plot_with_nothing_in_it_is_a_line(app):
     assert polar.handle.visible and not polar.why.visible
     plots.begin(View(by_hand()))
     assert spectrum.handle.visible and not spectrum.why.visible
+
+
+def test_only_what_was_wrong_goes_away_once_something_else_is_chosen(app):
+    line = app.tab(CompareTab).panel._line
+    line.say("all measurements are held out", refuses=True)
+    line.forget_refusal()
+    assert not line._text.content
+    line.say("all measurements are held out", refuses=True)
+    line.say("Stopped.")
+    line.forget_refusal()
+    assert "Stopped." in line._text.content
+    line.say("")

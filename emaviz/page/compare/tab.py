@@ -585,13 +585,12 @@ class ComparePanel:
         if why:
             self._comparing.provenance.refused()
         if why and not by_hand:
-            self._line.say(why)
+            self._line.say(why, refuses=True)
 
     def _forget_errors(self) -> None:
         """What was said of a comparison that nobody asks for any more."""
         self._page.say_beside(self._start, "")
-        if not self._comparing.running:
-            self._line.say("")
+        self._line.forget_refusal()
 
     def _show_running(self) -> None:
         """While one runs it is asked for already; else a press is carried out, or says what is missing."""

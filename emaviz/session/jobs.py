@@ -109,6 +109,7 @@ class Worker:
         self._wake = threading.Condition()
         self._quick: dict[str, Call] = {}
         self._long: Steps | None = None
+        self._end: Call | None = None  # tells that the long job is over
         self._title = ""  # of the long job that was begun last
         self.progress = ""  # how far that says it is
         self.jobs = Jobs(self)  # the long ones: which runs, and which wait
@@ -135,6 +136,10 @@ class Worker:
             self._wake.notify()
             return True
 
+    def finish(self, end: Call) -> None:
+        """From within the last step of the long job: calls end() once the thread is free for another one."""
+        self._end = end
+
     def breathe(self) -> None:
         """Runs the quick jobs that wait, from within a step of the long job that takes longer than they should."""
         assert threading.current_thread() is self._thread
@@ -153,8 +158,8 @@ class Worker:
 
     @property
     def busy(self) -> bool:
-        """Whether a long job runs."""
-        return self._long is not None
+        """Whether a long job runs, or its end is to be told."""
+        return self._long is not None or self._end is not None
 
     @property
     def doing(self) -> str:
@@ -190,6 +195,7 @@ class Worker:
             elif self._long is not None:
                 started = time.monotonic()
                 self.guarded(self._step)
+                self._tell_end()
                 self._yield_to_quick_jobs(time.monotonic() - started)
         if self._long is not None:
             self.guarded(self._long.close)
@@ -216,10 +222,17 @@ class Worker:
             next(self._long)
         except StopIteration:
             self._long = None
-            _give_back()
         except BaseException:
             self._long = None  # before the error is told, so that another may be started at once
             raise
+
+    def _tell_end(self) -> None:
+        """Of the long job whose last step that was, also where another one has begun since."""
+        if self._end is None:
+            return
+        self.guarded(self._end)
+        self._end = None
+        _give_back()
 
     def guarded(self, job: Call) -> None:
         """Runs a job; an error is told, and the thread goes on."""
@@ -652,4 +665,4 @@ class Job:
                 self._worker.jobs.over(Ended(self, run.title, run.stopping))
             self.ended((done() if done is not None else None) or text)
 
-        self._worker.post(f"end of {id(self)}", ended)
+        self._worker.finish(ended)

@@ -60,7 +60,7 @@ def raced(session, algorithms, seconds=120.0):
         assert done.wait(seconds)
     finally:
         session.identifying.identified.disconnect(keep)
-    wait_until(lambda: not session.worker.busy)
+    wait_until(lambda: not session.identifying.job.running)
     return races[0]
 
 
@@ -152,7 +152,7 @@ def test_a_pause_stops_the_search_while_sliders_are_answered(session):
         wait_until(lambda: len(races) > at)
         session.identifying.job.pause(True)
         session.identifying.job.stop()  # also ends one that rests
-        wait_until(lambda: not session.worker.busy)
+        wait_until(lambda: not session.identifying.job.running)
         assert races[0].answers[0].stopped
     finally:
         session.identifying.progressed.disconnect(races.append)

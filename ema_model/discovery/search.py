@@ -245,8 +245,7 @@ class Search:
             found: list[Contender] = []
             standing: list[Contender] = []  # those that are named, if they are the best
             best = -math.inf
-            is_told = within_band(story.data, story.current)
-            while not is_told and len(standing) < _REFITTED and len(found) < _MOST_REFITTED:
+            while len(standing) < _REFITTED and len(found) < _MOST_REFITTED:
                 left = [one for one in room[len(found) :] if one.gain > max(WORTH_A_REFIT, best)]
                 chosen = [one for one in left if one.gain > might * left[0].gain][: _REFITTED - len(standing)]
                 if not chosen:
@@ -255,14 +254,40 @@ class Search:
                 self._shown(found)
                 standing = self._named(found)
                 # What promises more than this is refitted, too.
-                best = max((one.gain for one in standing), default=-math.inf)
+                best = MIGHT * max((one.gain for one in standing), default=-math.inf)
             if standing:  # what a short travel shows of it, or a narrow range, may be all that there is
-                trial = max(standing, key=lambda one: one.gain).trial
+                best_one = max(standing, key=lambda one: one.gain)
+                trial = best_one.trial
                 tried = {one.trial.candidate.name for one in found}
                 terms = () if trial.faults else find(trial.candidate.name).terms
                 found += self._refits([one for one in room if one.candidate.name in {*terms} - tried])
+                if self._is_told() and not trial.faults:
+                    found = _best_of_each([*found, *self._laws_instead(best_one, room)])
             self._refitted = seen, sorted(found, key=lambda one: -one.gain)
         return self._refitted[1]
+
+    def _is_told(self) -> bool:
+        """Whether the last model leaves no more than a true one does."""
+        return within_band(self.story.data, self.story.current)
+
+    def _laws_instead(self, first: Contender, room: Sequence[ScoredTerm]) -> list[Contender]:
+        """Other laws of the same place or speed, each fitted from where that one ended.
+
+        What a true model may leave has a shape of its own, that one of two wrong laws may meet better.
+        """
+        seen, found, name = self._round(), first.trial.fit, first.trial.candidate.name
+        (key,) = first.trial.effects
+        about = AboutFit.of(found, seen.noise).without(places_of(found, key))
+        own = evidence_of(seen.noise, about.residual, about.unknowns)
+        start = {name: x for name, x in found.starts.items() if not name.startswith(f"effects.{key}.")}
+
+        def there(one: ScoredTerm) -> ScoredTerm:
+            term = one.term
+            whole = evidence_of(seen.noise, about.residual, about.unknowns.beside([term.unknowns]), own.levels)
+            candidate = term.candidate(whole.amounts[-len(term.unknowns.mean) :], found)
+            return replace(one, candidate=candidate, start=start)
+
+        return self._refits([there(one) for one in room if _is_of_one_law(one.candidate.name, name)])
 
     def _refits(self, chosen: Sequence[ScoredTerm]) -> list[Contender]:
         """Terms in the last model, each refitted."""
@@ -297,15 +322,15 @@ class Search:
         story, seen, contenders = self.story, self._round(), self._contenders()
         named = self._named(contenders)
         beyond = {one.trial.candidate.name for one in contenders if self._is_beyond(one)}
-        if within_band(story.data, story.current):  # beside what leaves no more than a true model, nothing is missing
-            beyond |= {one.candidate.name for one in seen.best if self._is_beyond(one)}
         ruled_out = beyond - {one.trial.candidate.name for one in named}
         self._first = self._first or seen.candidates(contenders, ruled_out)
         if not named:
             return self._turned_back(contenders) and self._added()
         first = _simplest(named)
         name = first.trial.candidate.name
-        alike = [one.trial for one in named if one is not first and not first.is_told_apart_from(one)]
+        # What a true model may leave has a shape of its own, that one of two wrong laws may meet better.
+        near = self._is_told()
+        alike = [one.trial for one in named if one is not first and (near or not first.is_told_apart_from(one))]
         as_probable = {one.candidate.name for one in [first.trial, *alike]}
         # What it is a term of is the same, seen over a short travel: told where nothing else is.
         alike = [trial for trial in alike if trial.faults or name not in find(trial.candidate.name).terms] or alike
@@ -651,6 +676,22 @@ def _falls(story: Story) -> bool:
     """Whether the error that is told fell with the last step."""
     before, after = (rung.rmse for rung in story.ladder[-2:])
     return after < (1.0 - LEAST_FALL) * before
+
+
+def _best_of_each(contenders: Sequence[Contender]) -> list[Contender]:
+    """Of contenders of one name, the most probable."""
+    best: dict[str, Contender] = {}
+    for one in sorted(contenders, key=lambda one: one.gain):
+        best[one.trial.candidate.name] = one
+    return [*best.values()]
+
+
+def _is_of_one_law(one: str, other: str) -> bool:
+    """Whether two effects are different ones that go by the same place or speed, in the same way."""
+    if one == other or one in NAMES:
+        return False
+    first, second = find(one), find(other)
+    return (first.family, first.against, first.is_load) == (second.family, second.against, second.is_load)
 
 
 def _simplest(named: Sequence[Contender]) -> Contender:

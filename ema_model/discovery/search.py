@@ -532,12 +532,12 @@ class Search:
         """Takes out what the last model does not need, or puts in its place what makes it more probable."""
         story, tell = self.story, self._tell
         members = [*(one.key for one in story.added), *causes(story.current.faults)]
-        if len(members) < 2:
+        if not members:
             return False
         seen = self._round()
         whole = AboutFit.of(seen.beside, seen.noise)
         straight = evidence_of(seen.noise, whole.residual, whole.unknowns).log
-        for key in members:
+        for key in members if len(members) > 1 else ():
             smaller = whole.without(places_of(seen.beside, key))
             if evidence_of(seen.noise, smaller.residual, smaller.unknowns).log < straight - 2.0 * NAMED:
                 continue
@@ -546,7 +546,10 @@ class Search:
             if evidence_of_fit(story.data, story.held, found, seen.noise).log > seen.before.log - NAMED:
                 story.remove(key, found)
                 return True
-        return any(self._replaced(key, seen, whole, straight) for key in members[:-1])
+        # The last was chosen beside the model that it is in, unless that was far off, where algebra tells little.
+        rungs = story.ladder[-2:]
+        chosen = members if len(rungs) > 1 and rungs[0].rmse > FAR else members[:-1]
+        return any(self._replaced(key, seen, whole, straight) for key in chosen)
 
     def _replaced(self, key: str, seen: Round, whole: AboutFit, straight: float) -> bool:
         """Puts the best other Term in the place of an effect or a fault where that makes the model more probable.
@@ -562,7 +565,7 @@ class Search:
         rough = gains_of(seen.noise, own, about.unknowns, [one.unknowns for one in terms])
         term = terms[int(np.argmax(rough + [one.log_share for one in terms]))]
         other = evidence_of(seen.noise, about.residual, about.unknowns.beside([term.unknowns]), own.levels)
-        if other.log + term.log_share < straight - NAMED or (key, term.name) in self._exchanges:
+        if other.log + term.log_share - own.log < MIGHT * (straight - own.log) or (key, term.name) in self._exchanges:
             return False
         self._exchanges |= {(key, term.name), (term.name, key)}
         tell(f"weighing {term.name} against {key} again")
@@ -580,8 +583,23 @@ class Search:
             story.remove(key, smaller)
             story.add(trial)
         else:
+            was = next(one for one in story.added if one.key == key)
             story.swap(key, trial)
+            self._is_instead(candidate.name, was, gain)
         return True
+
+    def _is_instead(self, name: str, was: Added, gain: float) -> None:
+        """An effect is as probable as what it took the place of, which is less so by that logarithm."""
+        story, whole = self.story, was.probability
+        key = next(one.key for one in story.added if one.name == name)
+        if gain < NAMED:
+            story.tie(key, was.name, True)
+        if whole is None:
+            return
+        share = 1.0 / (1.0 + math.exp(-gain))
+        story.set_probability(key, whole if gain < NAMED else share * whole)
+        now = {name: share * whole, was.name: (1.0 - share) * whole}
+        self._first = [replace(one, probability=now.get(one.name, one.probability)) for one in self._first]
 
 
 # --- inverse dynamics beside a closed loop ----------------------------------------------------------------------------

@@ -245,7 +245,8 @@ class Search:
             found: list[Contender] = []
             standing: list[Contender] = []  # those that are named, if they are the best
             best = -math.inf
-            while len(standing) < _REFITTED and len(found) < _MOST_REFITTED:
+            is_told = self._is_told()
+            while not is_told and len(standing) < _REFITTED and len(found) < _MOST_REFITTED:
                 left = [one for one in room[len(found) :] if one.gain > max(WORTH_A_REFIT, best)]
                 chosen = [one for one in left if one.gain > might * left[0].gain][: _REFITTED - len(standing)]
                 if not chosen:
@@ -261,12 +262,20 @@ class Search:
                 tried = {one.trial.candidate.name for one in found}
                 terms = () if trial.faults else find(trial.candidate.name).terms
                 found += self._refits([one for one in room if one.candidate.name in {*terms} - tried])
-                if self._is_told() and not trial.faults:
+                if self._is_near() and not trial.faults:
                     found = _best_of_each([*found, *self._laws_instead(best_one, room)])
             self._refitted = seen, sorted(found, key=lambda one: -one.gain)
         return self._refitted[1]
 
     def _is_told(self) -> bool:
+        """Whether nothing more is looked for: beside an effect or a fault, the model leaves no more than a true one.
+
+        What the law of an effect has otherwise than the real one is no cause of its own.  A bare model is searched
+        there, too: its parameters may have taken up what is missing.
+        """
+        return self._is_near() and bool(self.story.added or self.story.current.faults)
+
+    def _is_near(self) -> bool:
         """Whether the last model leaves no more than a true one does."""
         return within_band(self.story.data, self.story.current)
 
@@ -322,6 +331,8 @@ class Search:
         story, seen, contenders = self.story, self._round(), self._contenders()
         named = self._named(contenders)
         beyond = {one.trial.candidate.name for one in contenders if self._is_beyond(one)}
+        if self._is_told():
+            beyond |= {one.candidate.name for one in seen.best if self._is_beyond(one)}
         ruled_out = beyond - {one.trial.candidate.name for one in named}
         self._first = self._first or seen.candidates(contenders, ruled_out)
         if not named:
@@ -329,7 +340,7 @@ class Search:
         first = _simplest(named)
         name = first.trial.candidate.name
         # What a true model may leave has a shape of its own, that one of two wrong laws may meet better.
-        near = self._is_told()
+        near = self._is_near()
         alike = [one.trial for one in named if one is not first and (near or not first.is_told_apart_from(one))]
         as_probable = {one.candidate.name for one in [first.trial, *alike]}
         # What it is a term of is the same, seen over a short travel: told where nothing else is.

@@ -118,15 +118,16 @@ def test_a_hidden_effect_is_named_with_how_probable_it_is():
 
 
 @pytest.mark.parametrize(
-    ("against", "is_within", "refitted"),
+    ("against", "is_within", "added", "refitted"),
     [
-        ("", False, [("next", 12.0), ("best", -1.0)]),
-        ("next", False, [("next", 12.0), ("third", 3.0), ("best", -1.0)]),
-        ("", True, []),
+        ("", False, (), [("next", 12.0), ("best", -1.0)]),
+        ("next", False, (), [("next", 12.0), ("third", 3.0), ("best", -1.0)]),
+        ("", True, (), [("next", 12.0), ("best", -1.0)]),
+        ("", True, (SimpleNamespace(name="an effect"),), []),
     ],
-    ids=["nothing speaks against them", "something does against one", "nothing is left to be told"],
+    ids=["nothing speaks against them", "something does against one", "a bare model", "nothing is left to be told"],
 )
-def test_what_promises_more_than_the_refitted_is_refitted_too(monkeypatch, against, is_within, refitted):
+def test_what_promises_more_than_the_refitted_is_refitted_too(monkeypatch, against, is_within, added, refitted):
     """What looks best by algebra, and is nothing once refitted, hides no other; nor does what cannot be."""
     gains = {"best": 25.0, "next": 14.0, "third": 4.0, "hopeless": 1.0}
     terms = [
@@ -136,7 +137,8 @@ def test_what_promises_more_than_the_refitted_is_refitted_too(monkeypatch, again
         for n, g in gains.items()
     ]
     real = {"best": -1.0, "next": 12.0, "third": 3.0}
-    of = search.Search(SimpleNamespace(added=(), data=None, held=None, current=None, refused={}))
+    current = SimpleNamespace(faults=())
+    of = search.Search(SimpleNamespace(added=added, data=None, held=None, current=current, refused={}))
     before = Evident(0.0, 0.0, 0.0)
     seen = rounds.Round(None, None, before, (), terms)
     monkeypatch.setattr(of, "_round", lambda: seen)

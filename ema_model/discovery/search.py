@@ -337,10 +337,10 @@ class Search:
         self._first = self._first or seen.candidates(contenders, ruled_out)
         if not named:
             return self._turned_back(contenders) and self._added()
-        first = _simplest(named)
+        near = self._is_near()
+        first = _simplest(named, near)
         name = first.trial.candidate.name
         # What a true model may leave has a shape of its own, that one of two wrong laws may meet better.
-        near = self._is_near()
         alike = [one.trial for one in named if one is not first and (near or not first.is_told_apart_from(one))]
         as_probable = {one.candidate.name for one in [first.trial, *alike]}
         # What it is a term of is the same, seen over a short travel: told where nothing else is.
@@ -723,12 +723,15 @@ def _is_of_one_law(one: str, other: str) -> bool:
     return (first.family, first.against, first.is_load) == (second.family, second.against, second.is_load)
 
 
-def _simplest(named: Sequence[Contender]) -> Contender:
-    """The most probable, or a term of its series that is not far less: the motion shows no more than that."""
+def _simplest(named: Sequence[Contender], near: bool) -> Contender:
+    """The most probable, or a term of its series that is not far less: the motion shows no more than that.
+
+    near: whether the recordings' noise tells no law from another.
+    """
     first = named[0]
     terms = () if first.trial.faults else find(first.trial.candidate.name).terms
-    near = [one for one in named if one.trial.candidate.name in terms and not first.is_told_apart_from(one)]
-    return near[0] if near else first
+    its = [one for one in named if one.trial.candidate.name in terms and (near or not first.is_told_apart_from(one))]
+    return its[0] if its else first
 
 
 def _without_series(others: Sequence[Trial]) -> list[Trial]:

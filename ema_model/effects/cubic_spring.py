@@ -29,6 +29,7 @@ EFFECT = Effect(
     shows="in the current, with the cube of the user position",
     against="user_position",
     mistaken_for="hinge moment, one-sided spring",
+    terms=("hinge_moment",),
     family="mechanics",
     is_load=True,
 )

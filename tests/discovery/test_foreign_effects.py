@@ -52,9 +52,13 @@ AT_FLOOR = pytest.mark.xfail(
 
 @pytest.mark.parametrize("unit", [4, pytest.param(5, marks=AT_FLOOR), pytest.param(22, marks=AT_FLOOR)])
 def test_a_spring_is_found_though_the_files_tolerances_nearly_take_it_up(tmp_path, unit):
-    """Without it the arm's moment goes to its bound, and the error is at the floor all the same."""
+    """Without it the arm's moment goes to its bound, and the error is at the floor all the same.
+
+    A spring that grows stiffer may do as well there: the recordings' own noise does not tell a law's shape.
+    """
     found, _ = discovered(tmp_path, "spring", unit)
-    assert [one.name for one in found.effects] == ["hinge_moment"], found
+    (spring,) = found.effects
+    assert "hinge_moment" in {spring.name, *spring.same_as} <= {"hinge_moment", "cubic_spring", "one_sided_spring"}
     assert not found.parameters_outside_tolerance and found.ladder[-1].rmse <= BAND
 
 

@@ -47,7 +47,7 @@ from ema_model.simulation import plant
 from ema_model.simulation.run import Run
 from ema_model.tracking import track as tracking
 from ema_model.tracking.flights import check_enough, check_order, flights_in, identified
-from ema_model.tracking.result import Tracked
+from ema_model.tracking.track import Tracked
 
 __all__ = [
     "InputError",

@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 
 from ema_model.errors import InputError
 from ema_model.quantities.numbers import HALF_90
-from ema_model.tracking.result import Tracked
+from ema_model.tracking.track import Tracked
 from emaviz.recording import writer as drawn_as
 from emaviz.recording.blueprint import plot
 from emaviz.recording.entry import RecordingError

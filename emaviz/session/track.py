@@ -23,11 +23,9 @@ from ema_model.recordings import read
 from ema_model.recordings.recording_set import recordings_in
 from ema_model.recordings.side_file import SideFile
 from ema_model.result import restored, stored
-from ema_model.tracking.evidence import LEAST_FLIGHTS
 from ema_model.tracking.flights import Flight, check_enough, check_order, flights_in, identified, in_order
-from ema_model.tracking.history import History
-from ema_model.tracking.result import Tracked
-from ema_model.tracking.track import check_thresholds
+from ema_model.tracking.track import History, Tracked, check_thresholds
+from ema_model.tracking.trends import LEAST_FLIGHTS
 from emaviz.session.data_folder import DataFolder
 from emaviz.session.explore import Session
 from emaviz.session.files import Practice, side_file_of

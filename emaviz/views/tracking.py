@@ -10,8 +10,7 @@ import numpy as np
 import plotly.graph_objects as go
 from numpy.typing import ArrayLike
 
-from ema_model.tracking.result import Tracked
-from ema_model.tracking.words import headline
+from ema_model.tracking.track import Tracked, headline
 from emaviz.figures import tracking
 from emaviz.text.results import Meaning
 from emaviz.views import ANSWER, Figures, Section, View

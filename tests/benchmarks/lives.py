@@ -25,8 +25,7 @@ from ema_model.campaign.kinds.track import ALPHA, LAMBDA, LAMBDAS, Told, places
 from ema_model.estimation.problem import ECCENTRICITY, to_vector
 from ema_model.simulated_lives import LAWS, Life, drawn, worn_life
 from ema_model.simulated_lives.life import ONSET, POWER, base_of
-from ema_model.tracking.flights import Flight
-from ema_model.tracking.series import Unit
+from ema_model.tracking.flights import Flight, Unit
 from ema_model.tracking.track import Tracker
 
 WAYS = ("emaviz", "exponential fit", "particle filter", "law alone", "oracle", "bound")

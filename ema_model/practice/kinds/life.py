@@ -14,7 +14,7 @@ from ema_model.quantities.titles import in_sentence
 from ema_model.recordings import write_measurement
 from ema_model.simulated_lives import Life, recorded, worn_life
 from ema_model.text import InWords
-from ema_model.tracking.result import Tracked
+from ema_model.tracking.track import Tracked
 
 
 class OneLife(Kind):

@@ -55,7 +55,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def documents() -> tuple[type, ...]:
     """What --json holds."""
     from ema_model.result import json_type
-    from ema_model.tracking.result import Tracked
+    from ema_model.tracking.track import Tracked
     from emaviz.cli.documents import InterruptedTrackJson
 
     return (json_type(Tracked, InterruptedTrackJson),)
@@ -83,7 +83,7 @@ def run(arguments: argparse.Namespace) -> int:
                         flights.append(flight)
                         answer.grows()
             except KeyboardInterrupt:
-                from ema_model.tracking.evidence import LEAST_FLIGHTS
+                from ema_model.tracking.trends import LEAST_FLIGHTS
 
                 progress.done()
                 print(f"Interrupted: {len(flights)} of {len(paths)} flights are identified.", flush=True)
@@ -140,8 +140,8 @@ def _watch(
     """Until it is interrupted; a file that cannot be used is told once and left out, and may be replaced."""
     from ema_model.files.arriving import LOOK_S, Watched
     from ema_model.recordings.recording_set import recordings_in
-    from ema_model.tracking.evidence import LEAST_FLIGHTS
     from ema_model.tracking.flights import check_order, in_order
+    from ema_model.tracking.trends import LEAST_FLIGHTS
     from emaviz.cli import option_values
 
     folder = Path(arguments.files[0])

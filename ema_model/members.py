@@ -36,6 +36,18 @@ def stated(package: str, fact: str) -> dict[str, Any]:
     return found
 
 
+def stated_by_class(package: str, fact: str) -> dict[str, Any]:
+    """The literals that the classes of a package's files assign to this name, by the classes' names."""
+    return {
+        node.name: value
+        for place in _places(package)
+        for path in sorted(place.glob("[!_]*.py"))
+        for node in _parsed(_source(path)).body
+        if isinstance(node, ast.ClassDef)
+        for value in _assigned(node, fact)
+    }
+
+
 def stated_in(module: str, fact: str) -> Any:
     """The same of one file: the literal that it assigns to this name."""
     package, _, name = module.rpartition(".")

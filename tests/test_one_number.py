@@ -43,9 +43,7 @@ from ema_model.identification.run import Identification, identify
 from ema_model.identification.search import Objective
 from ema_model.identification.words import in_one_line
 from ema_model.identification.words import verdict as identified_verdict
-from ema_model.quantities.axes import of_signal
-from ema_model.quantities.numbers import amount, number
-from ema_model.quantities.variables import variable_title
+from ema_model.quantities import amount, number, of_signal, variable_title
 from ema_model.recordings import Measurement
 from ema_model.recordings.read import read_measurement
 from ema_model.text import COLOURS
@@ -232,7 +230,7 @@ def test_shares_are_those_of_the_residual_as_it_is(case):
 
 
 def _modulators(figure: Any) -> list[str]:
-    from ema_model.quantities.variables import MODULATORS
+    from ema_model.quantities import MODULATORS
 
     return [next(name for name, one in MODULATORS.items() if one.title == bar.name) for bar in figure.data]
 

@@ -29,9 +29,8 @@ from ema_model.errors import InputError, did_you_mean, quoted
 from ema_model.faults import vector
 from ema_model.files.opened import TEXT_BYTES, open_user_file, shipped_folder
 from ema_model.files.written import toml_of
-from ema_model.quantities.axes import KINDS as AXIS_KINDS
-from ema_model.quantities.axes import Axes
-from ema_model.quantities.numbers import as_number
+from ema_model.quantities import KINDS as AXIS_KINDS
+from ema_model.quantities import Axes, as_number
 
 # --- whether all that an actuator's file says is read by a model of its kind ------------------------------------------
 

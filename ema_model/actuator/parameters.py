@@ -9,10 +9,7 @@ from typing import Any
 
 from ema_model.actuator import keys
 from ema_model.errors import InputError, quoted
-from ema_model.quantities.axes import Axes
-from ema_model.quantities.numbers import as_number
-from ema_model.quantities.sides import MOTOR, USER, Side
-from ema_model.quantities.titles import in_sentence, parameter_title, unit_of
+from ema_model.quantities import MOTOR, USER, Axes, Side, as_number, in_sentence, parameter_title, unit_of
 
 # --- an actuator's parameters and their tolerances --------------------------------------------------------------------
 
@@ -63,7 +60,7 @@ def _of(facts: Facts, sits: Sits, default: Any = MISSING) -> Any:
 class Controller:
     """Control electronics.
 
-    cascade: position and PID speed loop (T 3.2.3; `ema_model.physics.controller`).  With a hysteresis inverter it is
+    cascade: position and PID speed loop (T 3.2.3; `ema_model.physics.electronics`).  With a hysteresis inverter it is
     the thesis's, whose integral is held at standstill.  position: a position loop alone, whose output is a share of
     what the drive can give.  unknown: recordings are held against inverse dynamics.
     """

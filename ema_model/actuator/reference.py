@@ -28,8 +28,7 @@ from ema_model.actuator.parameters import (
     unread,
 )
 from ema_model.files.written import inline
-from ema_model.quantities.axes import Axes
-from ema_model.quantities.numbers import number
+from ema_model.quantities import Axes, number
 
 if TYPE_CHECKING:
     from ema_model.effects.user import UserEffect

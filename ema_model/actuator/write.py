@@ -17,7 +17,7 @@ from ema_model.actuator.reference import as_spelt, tables_of
 from ema_model.errors import InputError, quoted
 from ema_model.files.opened import TEXT_BYTES
 from ema_model.files.written import change_file, inline, toml_of, toml_text
-from ema_model.quantities.axes import Axes
+from ema_model.quantities import Axes
 
 _COMMENTS_AT = 64  # characters from the left
 _HEAD = re.compile(r"\[\s*([\w.-]+)\s*\]\s*(?:#.*)?")

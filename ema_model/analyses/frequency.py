@@ -33,7 +33,7 @@ from ema_model.errors import InputError
 from ema_model.files.opened import listed
 from ema_model.models import ClosedLoop
 from ema_model.models.loop_window import LoopWindow
-from ema_model.quantities.numbers import HALF_90
+from ema_model.quantities import HALF_90
 from ema_model.recordings import SIGNALS, Measurement
 from ema_model.result import Result
 

@@ -25,7 +25,7 @@ from ema_model.errors import InputError, did_you_mean, quoted
 from ema_model.estimation import default_free
 from ema_model.faults import vector
 from ema_model.files.opened import listed, open_user_file
-from ema_model.quantities.numbers import as_number
+from ema_model.quantities import as_number
 from ema_model.recordings import Measurement, find_side_file, read
 from ema_model.recordings.measurement import Sensors
 from ema_model.recordings.recording_set import check_held_out

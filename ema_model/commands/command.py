@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ema_model.errors import InputError
-from ema_model.quantities.numbers import check_number
+from ema_model.quantities import check_number
 
 Array = NDArray[np.floating]
 

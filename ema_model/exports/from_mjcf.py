@@ -9,8 +9,7 @@ from typing import Any
 
 from ema_model.errors import InputError, did_you_mean, quoted
 from ema_model.exports import mjcf
-from ema_model.quantities.axes import Axes
-from ema_model.quantities.sides import MOTOR, USER
+from ema_model.quantities import MOTOR, USER, Axes
 
 _FAST = 1e4  # rad/s: a speed limit that is none
 _STRONG = 1e3  # times the dry friction: a torque limit where the model has none

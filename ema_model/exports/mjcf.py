@@ -31,8 +31,7 @@ from ema_model.exports.exported import Exported
 from ema_model.exports.replay import Proof, RecordingLoss, kernel_values, loss_of, shortened
 from ema_model.exports.result import CannotHold
 from ema_model.models.loop_window import COMPARED, LoopWindow
-from ema_model.quantities.sides import USER
-from ema_model.quantities.titles import in_sentence
+from ema_model.quantities import USER, in_sentence
 
 Array = NDArray[np.float64]
 

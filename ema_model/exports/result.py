@@ -11,8 +11,7 @@ from msgspec import Meta
 
 from ema_model.exports.exported import Exported
 from ema_model.exports.replay import EXACT, RecordingLoss, SignalLoss
-from ema_model.quantities.axes import Axes, of_signal
-from ema_model.quantities.titles import all_of
+from ema_model.quantities import Axes, all_of, of_signal
 from ema_model.result import FLAT, NAME, NULL, Result, as_named
 from ema_model.text import Document, Lines, Note, Table
 

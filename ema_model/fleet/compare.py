@@ -20,7 +20,7 @@ from ema_model.fleet.fit import Fitted, Together, fit, together
 from ema_model.fleet.pool import Pair, Pool
 from ema_model.fleet.result import Alone, Difference, Need, OfRecording, OfType, Transfer, UnitsCompared
 from ema_model.fleet.select import alike
-from ema_model.quantities.numbers import HALF_90
+from ema_model.quantities import HALF_90
 from ema_model.recordings import Measurement
 from ema_model.recordings.read import check_same_actuator, prepared
 from ema_model.recordings.recording_set import check_held_out

@@ -13,9 +13,7 @@ from numpy.typing import NDArray
 from ema_model.actuator import Actuator
 from ema_model.actuator.parameters import on_axes
 from ema_model.fleet.criteria import MISFIT
-from ema_model.quantities.axes import of_signal
-from ema_model.quantities.numbers import HALF_90, amount, number, with_uncertainty
-from ema_model.quantities.titles import in_sentence
+from ema_model.quantities import HALF_90, amount, in_sentence, number, of_signal, with_uncertainty
 from ema_model.result import NAME, Result, as_named
 from ema_model.text import Block, Document, Lines, Note, Table
 

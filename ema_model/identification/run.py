@@ -23,7 +23,7 @@ from ema_model.identification.optimisers import OPTIMISERS, Optimiser, create
 from ema_model.identification.search import Objective, search
 from ema_model.identification.uncertainty import Uncertainty, uncertainty
 from ema_model.physics.rows import LANES
-from ema_model.quantities.numbers import as_number, check_seed
+from ema_model.quantities import as_number, check_seed
 from ema_model.result import FLAT, NAME, NULL, Result
 from ema_model.simulation.compiled import compile_ahead, compile_here, stack_at_hand, wait_for
 from ema_model.stacks import Stack

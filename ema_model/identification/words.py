@@ -12,8 +12,7 @@ from ema_model.actuator.actuator import between, sentences
 from ema_model.estimation.calibrate import combination_in_words
 from ema_model.identification.run import Identification, IdentifiedSoFar, algorithm_title
 from ema_model.identification.search import Landscape, Way
-from ema_model.quantities.numbers import amount
-from ema_model.quantities.titles import in_sentence
+from ema_model.quantities import amount, in_sentence
 from ema_model.simulation.run import run_in_words
 from ema_model.text import Document, Lines, Remark, Remarks, Table
 

@@ -10,9 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ema_model.files.opened import listed, shown
-from ema_model.quantities.axes import SIGNALS
-from ema_model.quantities.titles import in_sentence
-from ema_model.quantities.unit_conversion import find_unit
+from ema_model.quantities import SIGNALS, in_sentence
 from ema_model.recordings.column_mapping import MOST_DUTY, ColumnMapping, MappedColumn
 from ema_model.recordings.column_names import (
     BUS,
@@ -28,6 +26,7 @@ from ema_model.recordings.column_names import (
     readings,
 )
 from ema_model.recordings.exports import known_export
+from ema_model.recordings.units import find_unit
 
 # --- which signals a column may be by its name alone, and in which unit -----------------------------------------------
 

@@ -6,7 +6,7 @@ import itertools
 import re
 from dataclasses import dataclass
 
-from ema_model.quantities.unit_conversion import UNITS, find_unit
+from ema_model.recordings.units import UNITS, find_unit
 
 # What is measured.
 QUANTITIES: dict[str, frozenset[str]] = {

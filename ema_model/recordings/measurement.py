@@ -15,9 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 from ema_model.commands import recorded
 from ema_model.errors import InputError
 from ema_model.files.opened import listed, shown
-from ema_model.quantities.axes import SIGNALS, Axes
-from ema_model.quantities.numbers import check_number, check_seed, number
-from ema_model.quantities.sides import MOTOR, USER
+from ema_model.quantities import MOTOR, SIGNALS, USER, Axes, check_number, check_seed, number
 from ema_model.recordings.column_mapping import ColumnMapping, Reading
 from ema_model.recordings.formats.clocks import GAP, between
 from ema_model.recordings.noise import rotation_order

@@ -19,7 +19,7 @@ from ema_model.actuator import Actuator
 from ema_model.actuator.actuator import CURRENT_INPUTS, VOLTAGE_INPUTS
 from ema_model.errors import InputError, did_you_mean, quoted
 from ema_model.files.opened import COLUMNS, FILE_BYTES, RUNS, check_user_file, listed, megabytes, reason, refusal, shown
-from ema_model.quantities.axes import SIGNALS, lookalikes, looks_like_time
+from ema_model.quantities import SIGNALS, lookalikes, looks_like_time
 from ema_model.recordings.column_guess import doubt, guess_mapping
 from ema_model.recordings.column_mapping import (
     ColumnMapping,

@@ -16,8 +16,7 @@ from numpy.typing import NDArray
 from ema_model import faults
 from ema_model.errors import InputError, did_you_mean, quoted
 from ema_model.estimation.problem import ECCENTRICITY
-from ema_model.quantities.numbers import HALF_90, check_number, number
-from ema_model.quantities.titles import in_sentence
+from ema_model.quantities import HALF_90, check_number, in_sentence, number
 from ema_model.result import Result
 from ema_model.text import Document, Lines, Note, Table
 from ema_model.tracking.flights import Flight, Series

@@ -13,7 +13,7 @@ from ema_model import faults
 from ema_model.actuator import Actuator, load_actuator
 from ema_model.commands import Command, Recorded, command
 from ema_model.errors import InputError, quoted
-from ema_model.quantities.axes import Axes
+from ema_model.quantities import Axes
 from ema_model.recordings import Measurement, read
 from ema_model.recordings.formats.text_layout import Hints
 from ema_model.recordings.read import COMMAND_ALONE, INPUT_ALONE, VOLTAGE_ALONE, Needs, signals_in

@@ -10,9 +10,7 @@ from plotly.subplots import make_subplots
 
 from ema_model.actuator.parameters import on_axes
 from ema_model.fleet.result import UnitsCompared
-from ema_model.quantities.axes import of_signal
-from ema_model.quantities.numbers import HALF_90, Quantity, amount, number
-from ema_model.quantities.titles import in_sentence
+from ema_model.quantities import HALF_90, Quantity, amount, in_sentence, number, of_signal
 from emaviz.colours import LIMIT, REFERENCE
 from emaviz.figures import theme
 

@@ -15,8 +15,7 @@ from plotly.subplots import make_subplots
 
 from ema_model.faults import FAULTS
 from ema_model.identification.run import algorithm_title
-from ema_model.quantities.axes import ROTARY, Axes, of_signal
-from ema_model.quantities.sides import MOTOR, USER, Side
+from ema_model.quantities import MOTOR, ROTARY, USER, Axes, Side, of_signal
 from ema_model.recordings import SIGNALS, Measurement
 from ema_model.text import COLOURS
 from emaviz.colours import COMMAND, DIFFERENCE, GHOST, MONITOR, PHASES, REFERENCE, RUNS

@@ -9,14 +9,9 @@ import plotly.graph_objects as go
 
 from ema_model.estimation.problem import to_k
 from ema_model.faults import BY_NAME, NAMES
-from ema_model.quantities.numbers import HALF_90
+from ema_model.quantities import HALF_90
 from ema_model.tracking.flights import Flight
-from ema_model.tracking.track import (
-    TRACKED,
-    FaultTrack,
-    History,
-    Tracked,
-)
+from ema_model.tracking.track import TRACKED, FaultTrack, History, Tracked
 from ema_model.tracking.trends import LEAST_FLIGHTS, Remaining
 from emaviz.colours import CASES, COMMAND, MONITOR, REFERENCE
 from emaviz.figures import theme

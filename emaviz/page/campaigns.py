@@ -14,7 +14,7 @@ from ema_model.campaign.result import Campaign
 from ema_model.campaign.store import Store, summaries
 from ema_model.discovery.result import effect_title
 from ema_model.errors import InputError
-from ema_model.quantities.variables import NOTHING, explanation_title
+from ema_model.quantities import NOTHING, explanation_title
 from ema_model.recordings import Measurement
 from emaviz.figures.campaign import counted
 from emaviz.page.panel import JobLine

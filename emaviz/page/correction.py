@@ -11,7 +11,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
-from ema_model.quantities.numbers import number
+from ema_model.quantities import number
 from emaviz.page.workspaces import Page
 from emaviz.server.viser_private import id_of
 from emaviz.session.discover.discovering import Discovering

@@ -8,7 +8,7 @@ from typing import Any
 
 import viser
 
-from ema_model.quantities.titles import in_sentence
+from ema_model.quantities import in_sentence
 from ema_model.text import COLOURS
 from emaviz.page.style import JOBS
 from emaviz.page.workspaces import Page

@@ -11,16 +11,10 @@ import viser
 
 from ema_model.errors import InputError
 from ema_model.faults import BY_NAME
-from ema_model.quantities.titles import in_sentence
+from ema_model.quantities import in_sentence
 from ema_model.text import COLOURS
 from ema_model.tracking.flights import Flight
-from ema_model.tracking.track import (
-    TRACKED,
-    History,
-    Tracked,
-    headline,
-    hindsight,
-)
+from ema_model.tracking.track import TRACKED, History, Tracked, headline, hindsight
 from ema_model.tracking.trends import LEAST_FLIGHTS
 from emaviz.figures import tracking
 from emaviz.figures.tracking import CLICKED

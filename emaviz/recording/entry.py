@@ -16,8 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ema_model.files.written import FileLock, lock_path
-from ema_model.quantities.numbers import amount, number
-from ema_model.quantities.titles import in_sentence, parameter_title, unit_of
+from ema_model.quantities import amount, in_sentence, number, parameter_title, unit_of
 from ema_model.text import Facts
 
 

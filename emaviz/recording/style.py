@@ -7,7 +7,7 @@ import re
 import numpy as np
 
 from ema_model.faults import FAULTS
-from ema_model.quantities.axes import SIGNALS
+from ema_model.quantities import SIGNALS
 from emaviz import colours
 
 Colour = tuple[int, int, int, int]

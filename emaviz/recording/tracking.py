@@ -12,7 +12,7 @@ import rerun.blueprint as rrb
 from numpy.typing import ArrayLike
 
 from ema_model.errors import InputError
-from ema_model.quantities.numbers import HALF_90
+from ema_model.quantities import HALF_90
 from ema_model.tracking.track import Tracked
 from emaviz.recording import writer as drawn_as
 from emaviz.recording.blueprint import plot

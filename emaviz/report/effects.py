@@ -11,8 +11,7 @@ from ema_model.effects.effect import FAMILIES
 from ema_model.effects.user.entries import KEYS, TITLES
 from ema_model.errors import InputError, quoted
 from ema_model.files.written import whole_file
-from ema_model.quantities.axes import Axes
-from ema_model.quantities.variables import VARIABLES
+from ema_model.quantities import VARIABLES, Axes
 from ema_model.simulation.with_effect import EffectRuns
 from emaviz.figures.discovery import effect_residual_legend, pictures
 from emaviz.report.html_document import escape, paragraph, table

@@ -11,7 +11,7 @@ import viser
 from numpy.typing import ArrayLike, NDArray
 
 from ema_model.actuator import Actuator
-from ema_model.quantities.numbers import amount
+from ema_model.quantities import amount
 from emaviz.scene.framing import FIELD_RAD, Frame, frame
 from emaviz.scene.labels import Callout, Label, Labels
 from emaviz.scene.solids import (

@@ -16,7 +16,7 @@ import msgspec
 from ema_model.actuator import Actuator, load_actuator
 from ema_model.analyses import Analysis
 from ema_model.errors import InputError
-from ema_model.quantities.titles import in_sentence
+from ema_model.quantities import in_sentence
 from ema_model.recordings import write_measurement
 from ema_model.recordings.measurement import Measurement
 from ema_model.result import Result

@@ -17,7 +17,7 @@ from ema_model.challenges import challenges
 from ema_model.comparison.result import Comparison
 from ema_model.errors import InputError, quoted
 from ema_model.files.opened import refusal, shown
-from ema_model.quantities.titles import in_sentence
+from ema_model.quantities import in_sentence
 from ema_model.recordings import SIGNALS, ColumnMapping, Measurement, change_side_file, prepared, read
 from ema_model.recordings.formats.text_layout import Hints
 from ema_model.recordings.side_file import SideFile

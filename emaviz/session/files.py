@@ -17,9 +17,8 @@ from ema_model.actuator.reference import usual_tolerance
 from ema_model.challenges import Challenge
 from ema_model.errors import InputError, quoted
 from ema_model.files.opened import PAGE_BYTES, shipped_folder, shown
-from ema_model.practice import challenge_in, make, reveal, shipped
-from ema_model.practice.kinds.kind import Revealed
-from ema_model.quantities.axes import Axes
+from ema_model.practice import Revealed, challenge_in, make, reveal, shipped
+from ema_model.quantities import Axes
 from ema_model.recordings import ColumnMapping, Measurement, hints_of, prepared, read_columns, read_head, read_side_file
 from ema_model.recordings.formats.text_layout import Head, Hints
 from ema_model.recordings.health import Health, health_of

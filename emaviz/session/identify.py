@@ -19,7 +19,7 @@ from ema_model.identification.fit import CorrectedError
 from ema_model.identification.run import ALGORITHMS, SEARCH_SHARE, Identification, Progress, by_one_error, steps
 from ema_model.identification.search import Landscape, Objective, Way, extent, slices, ways
 from ema_model.identification.words import in_one_line, landscape_words
-from ema_model.quantities.numbers import amount
+from ema_model.quantities import amount
 from ema_model.recordings import Measurement
 from ema_model.result import restored, stored
 from ema_model.simulation import plant

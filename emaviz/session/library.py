@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 
 from ema_model.effects import CATALOGUE, find
 from ema_model.errors import InputError, quoted
-from ema_model.quantities.titles import in_sentence
+from ema_model.quantities import in_sentence
 from ema_model.simulation.with_effect import RUNS, EffectRuns, WithEffect
 from emaviz.session.explore import Session
 from emaviz.session.jobs import Job, Signal, Tell

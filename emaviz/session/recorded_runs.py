@@ -12,8 +12,7 @@ from ema_model.analyses import analyses
 from ema_model.discovery.words import effect_title
 from ema_model.errors import InputError
 from ema_model.files.opened import shown
-from ema_model.quantities.numbers import number
-from ema_model.quantities.titles import in_sentence
+from ema_model.quantities import in_sentence, number
 from emaviz.recording.entry import Entry
 from emaviz.session.data_folder import sanitised
 

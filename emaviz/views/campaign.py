@@ -17,10 +17,7 @@ from ema_model.campaign.result import Campaign, made_with
 from ema_model.campaign.store import failed, summaries
 from ema_model.discovery.result import effect_title
 from ema_model.effects import CATALOGUE
-from ema_model.quantities.axes import ROTARY
-from ema_model.quantities.numbers import amount
-from ema_model.quantities.titles import in_sentence
-from ema_model.quantities.variables import explanation_title
+from ema_model.quantities import ROTARY, amount, explanation_title, in_sentence
 from emaviz.figures import campaign
 from emaviz.text.results import Meaning
 from emaviz.views import Columns, Line, Piece, Row, Section, View

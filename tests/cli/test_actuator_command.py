@@ -30,7 +30,7 @@ from ema_model.actuator.parameters import (
 from ema_model.actuator.reference import kinds_of_actuators, markdown, parameter_rows
 from ema_model.commands import command
 from ema_model.effects.user.entries import KEYS as USERS
-from ema_model.quantities.axes import Axes
+from ema_model.quantities import Axes
 from ema_model.recordings import Measurement, write_measurement
 from ema_model.simulation.run import Run, simulate_monitor
 from emaviz.cli import main

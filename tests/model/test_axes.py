@@ -18,7 +18,7 @@ from ema_model.errors import InputError
 from ema_model.estimation.problem import unknowns_of
 from ema_model.models.inverse_dynamics import InverseDynamics
 from ema_model.models.loop_window import cut
-from ema_model.quantities.axes import Axes
+from ema_model.quantities import Axes
 from ema_model.recordings import Measurement
 from ema_model.recordings.health import health
 from ema_model.recordings.read import check_needed, prepared

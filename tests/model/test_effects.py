@@ -13,7 +13,7 @@ from ema_model.effects import CATALOGUE
 from ema_model.effects.effect import FAMILIES, STAGES
 from ema_model.effects.presliding_friction import EFFECT as PRESLIDING
 from ema_model.effects.torsional_compliance import EFFECT as COMPLIANCE
-from ema_model.physics.friction import advance_rotor
+from ema_model.physics.mechanics import advance_rotor
 from ema_model.simulation.run import Run, simulate_monitor, simulate_reference
 
 ACTUATOR = load_actuator()

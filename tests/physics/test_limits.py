@@ -16,9 +16,7 @@ from ema_model.commands import Recorded, command
 from ema_model.errors import InputError
 from ema_model.faults import vector
 from ema_model.physics import elementary
-from ema_model.physics.backlash import advance_play
-from ema_model.physics.friction import advance_reversing_rotor, advance_rotor, borello_friction
-from ema_model.physics.phases import (
+from ema_model.physics.electronics import (
     air_gap,
     equivalent_current,
     flux_factor,
@@ -27,6 +25,7 @@ from ema_model.physics.phases import (
     plus_120,
     winding_coefficients,
 )
+from ema_model.physics.mechanics import advance_play, advance_reversing_rotor, advance_rotor, borello_friction
 from ema_model.simulation.run import Run, simulate_monitor, simulate_reference
 
 ACTUATOR = load_actuator()

@@ -12,7 +12,7 @@ import pyarrow as pa
 from ema_model.campaign.kinds.kind import FLAG, NUMBER, NUMBERS, TEXT, Kind
 from ema_model.campaign.plan_axes import TaskInputs
 from ema_model.comparison import compare
-from ema_model.quantities.variables import explanation_title
+from ema_model.quantities import explanation_title
 
 
 @dataclass(frozen=True)

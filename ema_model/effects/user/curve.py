@@ -13,7 +13,7 @@ from ema_model.effects.user.module import generated_module
 from ema_model.effects.user.torque import RANGE
 from ema_model.effects.user.user_effect import UserEffect
 from ema_model.errors import InputError, quoted
-from ema_model.quantities.variables import VARIABLES
+from ema_model.quantities import VARIABLES
 
 MOST_KNOTS = 24
 _ARGUMENTS = {"theta": "theta", "omega": "omega", "user": "user", "q": "current", "load": "load", "t": "time"}

@@ -22,7 +22,7 @@ from ema_model.effects.user.expression import VARIABLES, parse
 from ema_model.effects.user.torque import RANGE, user_torque
 from ema_model.effects.user.user_effect import UserEffect
 from ema_model.errors import InputError, quoted
-from ema_model.quantities.numbers import as_number
+from ema_model.quantities import as_number
 
 _OF = ", ".join(f"{name} ({meaning})" for name, meaning in VARIABLES.items())
 # The keys of each kind, with what they mean.

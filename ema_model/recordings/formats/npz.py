@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from ema_model.errors import InputError
 from ema_model.files.opened import ARRAYS, Damaged, Member, Refused, SafeZip, listed, opened_zip, refusal, shown
-from ema_model.quantities.axes import SIGNALS
+from ema_model.quantities import SIGNALS
 from ema_model.recordings.column_names import is_time
 from ema_model.recordings.formats.channels import (
     Channel,

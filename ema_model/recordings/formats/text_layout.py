@@ -14,8 +14,8 @@ from dataclasses import dataclass
 from functools import lru_cache
 
 from ema_model.files.opened import refusal, shown
-from ema_model.quantities.unit_conversion import dimensions_of
 from ema_model.recordings.formats.stamps import is_stamp
+from ema_model.recordings.units import dimensions_of
 
 HEAD_BYTES = 65_536
 SEPARATORS = {"\t": "tabs", ";": "semicolons", ",": "commas", "|": "bars", " ": "blanks"}

@@ -55,7 +55,7 @@ def run(arguments: argparse.Namespace) -> int:
         # These take a second: recordings are refused before.
         from ema_model.discovery import discover, verified
         from ema_model.discovery.words import verification
-        from ema_model.quantities.numbers import plain
+        from ema_model.quantities import plain
 
         with PartialAnswer() as partial:
             found = discover(

@@ -80,7 +80,7 @@ def _users_facts(name: str) -> EffectJson:
 def explain(effect: Effect) -> str:
     """Everything about an effect, for a terminal."""
     from ema_model.effects.effect import FAMILIES
-    from ema_model.quantities.variables import VARIABLES
+    from ema_model.quantities import VARIABLES
 
     lines = [effect.title, f"  {effect.equation}", "", textwrap.fill(effect.explanation, 92), "", "Parameters"]
     width = max(len(p.name) for p in effect.parameters)
@@ -104,7 +104,7 @@ def explain(effect: Effect) -> str:
 
 def _on_a_linear_axis(parameter: Parameter) -> str:
     """What it is called where the side that it sits at is linear, and its range there."""
-    from ema_model.quantities.axes import Axes
+    from ema_model.quantities import Axes
 
     there = parameter.on(Axes("linear", "linear"))
     if there.unit == parameter.unit:

@@ -14,9 +14,9 @@ import numpy as np
 import viser
 
 from ema_model.errors import InputError
-from ema_model.quantities.unit_conversion import known_units
 from ema_model.recordings import SIGNALS, ColumnMapping, MappedColumn
 from ema_model.recordings.column_mapping import WITHOUT_DELAY, unit_in_name
+from ema_model.recordings.units import known_units
 from ema_model.text import COLOURS
 from emaviz.page.compare.files import LayoutControls, RawLines
 from emaviz.page.style import unseen_field

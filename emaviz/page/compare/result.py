@@ -18,7 +18,7 @@ from ema_model.errors import InputError
 from ema_model.estimation.calibrate import calibration_table, together
 from ema_model.estimation.floor import BAND_SIGMAS
 from ema_model.faults import HEALTHY
-from ema_model.quantities.variables import VARIABLES
+from ema_model.quantities import VARIABLES
 from ema_model.recordings import Measurement
 from emaviz.figures import campaign, lines, overlays
 from emaviz.figures import comparison as comparison_figures

@@ -14,8 +14,8 @@ from ema_model.actuator.keys import KINDS
 from ema_model.actuator.parameters import on_axes
 from ema_model.comparison import Comparison
 from ema_model.errors import InputError
-from ema_model.quantities.axes import KINDS as AXES
-from ema_model.quantities.axes import Axes
+from ema_model.quantities import KINDS as AXES
+from ema_model.quantities import Axes
 from ema_model.recordings import SIGNALS
 from ema_model.recordings.formats import FORMATS
 from ema_model.text import COLOURS

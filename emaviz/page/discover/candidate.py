@@ -25,9 +25,8 @@ from ema_model.errors import InputError
 from ema_model.estimation import Calibrated
 from ema_model.estimation.calibrate import within
 from ema_model.faults import BY_NAME
-from ema_model.quantities.numbers import Quantity, amount, number
-from ema_model.quantities.numbers import number as shown
-from ema_model.quantities.titles import in_sentence
+from ema_model.quantities import Quantity, amount, in_sentence, number
+from ema_model.quantities import number as shown
 from ema_model.text import COLOURS
 from emaviz.figures import discovery
 from emaviz.page.style import unseen

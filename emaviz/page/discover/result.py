@@ -29,8 +29,7 @@ from ema_model.discovery.words import (
 from ema_model.effects import CATALOGUE
 from ema_model.errors import InputError
 from ema_model.faults import HEALTHY
-from ema_model.quantities.numbers import number
-from ema_model.quantities.titles import in_sentence
+from ema_model.quantities import in_sentence, number
 from ema_model.recordings import SIGNALS, Measurement
 from emaviz.figures import discovery
 from emaviz.figures.discovery import equation

@@ -17,7 +17,7 @@ from ema_model.discovery.words import effect_title, rung_title
 from ema_model.effects import CATALOGUE
 from ema_model.errors import InputError, quoted
 from ema_model.faults import CAUSES
-from ema_model.quantities.numbers import number
+from ema_model.quantities import number
 from emaviz.page.discover import WORKSPACE, candidate
 from emaviz.page.discover.candidate import OwnEffect
 from emaviz.page.discover.result import HOME, DiscoveryPanel, SideBySide

@@ -21,9 +21,7 @@ from ema_model.discovery.result import Experiment
 from ema_model.effects import CATALOGUE, find
 from ema_model.faults import FAULTS, HEALTHY, vector
 from ema_model.identification.uncertainty import Suggestion
-from ema_model.quantities.axes import of_signal
-from ema_model.quantities.sides import USER
-from ema_model.quantities.titles import labelled
+from ema_model.quantities import USER, labelled, of_signal
 from ema_model.simulation import plant
 from ema_model.simulation.run import SHAPES
 from ema_model.text import COLOURS

@@ -30,7 +30,7 @@ from ema_model.exports.replay import EXACT
 from ema_model.exports.result import TargetProof
 from ema_model.faults import NAMES
 from ema_model.files.written import whole_file
-from ema_model.quantities.titles import in_sentence
+from ema_model.quantities import in_sentence
 from emaviz.session.compare import Comparing
 from emaviz.session.data_folder import DataFolder
 from emaviz.session.discover.history import Entries, Entry, Shown, Telling, undecided

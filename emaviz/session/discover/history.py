@@ -23,8 +23,7 @@ from ema_model.discovery.snapshot import Assessment, Look, assessed, known_of, l
 from ema_model.discovery.words import effect_title
 from ema_model.effects import CATALOGUE
 from ema_model.errors import InputError
-from ema_model.quantities.numbers import number
-from ema_model.quantities.titles import in_sentence
+from ema_model.quantities import in_sentence, number
 from ema_model.result import restored, stored
 from emaviz.session.discover.source import DiscoverySource, Recipe, SavedStory, story_of
 from emaviz.session.inputs import Inputs, Room, digest

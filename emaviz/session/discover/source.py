@@ -29,8 +29,7 @@ from ema_model.effects import CATALOGUE, find
 from ema_model.errors import InputError
 from ema_model.faults import BY_NAME, NAMES, named
 from ema_model.files.opened import CHALLENGE_RECORDING_BYTES
-from ema_model.quantities.numbers import amount
-from ema_model.quantities.titles import in_sentence
+from ema_model.quantities import amount, in_sentence
 from ema_model.recordings import Measurement, read
 from ema_model.recordings.measurement import Sensors
 from ema_model.text import Document, Lines, Remark, Remarks, Severity

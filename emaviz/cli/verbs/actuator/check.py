@@ -108,7 +108,7 @@ def _left(share: float) -> str:
 
 def _document(actuator: Actuator, found: dict[str, list[str]], arguments: argparse.Namespace) -> Document:
     from ema_model.actuator.parameters import on_axes, says_drive
-    from ema_model.quantities.titles import in_sentence
+    from ema_model.quantities import in_sentence
 
     free = [path for path, tolerance in actuator.tolerances.items() if tolerance.free]
     count = sum(map(len, found.values()))

@@ -24,7 +24,7 @@ _TEXTS = ("expression", "variable", "modulator")  # of a user's effect
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """The kinds, the values that are known, effects, and how recordings are read."""
-    kinds, axes = stated_in("ema_model.actuator.keys", "KINDS"), stated_in("ema_model.quantities.axes", "KINDS")
+    kinds, axes = stated_in("ema_model.actuator.keys", "KINDS"), stated_in("ema_model.quantities", "KINDS")
     parser.add_argument("file", type=options.SAVED_ACTUATOR, metavar="FILE.toml", help="the file to write")
     parser.add_argument(
         "--from",

@@ -9,7 +9,7 @@ from ema_model.actuator.describe import DRIVES, actuator_axes, asked, entry_of, 
 from ema_model.actuator.keys import KINDS
 from ema_model.actuator.parameters import facts_of, on_axes
 from ema_model.errors import InputError
-from ema_model.quantities.axes import KINDS as AXES
+from ema_model.quantities import KINDS as AXES
 from emaviz.cli.options import SAMPLE_RATE
 
 _GEAR = "transmission.gear_ratio"

@@ -1,10 +1,15 @@
-"""Made-up fleets: units, their own deviations, recordings, files."""
+"""Fleets of one type of actuator, made for tests and for teaching: units that differ in what is drawn, and is known.
+
+A fleet is drawn from a seed; its recordings are the three-phase model's, with sensors' noise.
+`python -m ema_model.simulated_fleets FOLDER [SEED]` makes one there, or tells the truth of the one there.
+"""
 
 from __future__ import annotations
 
 import base64
 import binascii
 import json
+import sys
 import zlib
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
@@ -14,7 +19,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from ema_model.actuator import Actuator, parse_actuator, save_actuator
+from ema_model.actuator import Actuator, load_actuator, parse_actuator, save_actuator
 from ema_model.actuator.write import as_toml
 from ema_model.commands import command
 from ema_model.errors import InputError
@@ -254,3 +259,29 @@ def read_truth(folder: Path) -> list[dict[str, object]]:
         return list(json.loads(text))
     except (OSError, binascii.Error, zlib.error, ValueError, RecursionError):
         raise InputError(f"{shown(folder / TRUTH)}: no truth of a fleet can be read there; name its folder") from None
+
+
+# --- as a program -----------------------------------------------------------------------------------------------------
+
+
+def main() -> int:
+    """SEED: a whole number from 0; units and differences are drawn from it."""
+    arguments = sys.argv[1:]
+    try:
+        if not 1 <= len(arguments) <= 2 or (len(arguments) == 2 and not arguments[1].isdecimal()):
+            raise InputError("python -m ema_model.simulated_fleets FOLDER [SEED], SEED a whole number from 0")
+        folder = Path(arguments[0])
+        if len(arguments) == 2 or not (folder / TRUTH).exists():
+            write(draw(load_actuator(), int(arguments[1]) if len(arguments) == 2 else 0), folder)
+            print(folder)
+        else:
+            for one in read_truth(folder):
+                print(one)
+    except InputError as error:
+        print(f"fleets: {error}", file=sys.stderr)
+        return 2
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

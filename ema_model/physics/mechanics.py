@@ -1,9 +1,11 @@
-"""Borello's dry friction with stick (T 3.5.1) and the step of a rotor under it."""
+"""The mechanics: dry friction with stick, the step of a rotor under it, and backlash."""
 
 from __future__ import annotations
 
 from ema_model.physics.elementary import clamp
 from ema_model.physics.jit import scalar
+
+# --- Borello's dry friction with stick (T 3.5.1), and the step of a rotor under it ------------------------------------
 
 
 @scalar
@@ -46,3 +48,12 @@ def advance_reversing_rotor(theta, omega, net_torque, inverse_inertia, sticks, s
     theta1 = clamp(free, stop_low, stop_high)
     after = dt * accelerated / (accelerated - omega) if stops else 0.0
     return theta1, (omega1 if theta1 == free else 0.0), after
+
+
+# --- backlash as a play operator with memory (T 3.5.2; Simulink's Backlash block) -------------------------------------
+
+
+@scalar
+def advance_play(play, theta, half_width):
+    """Output of the play: it stays where it is until the input pushes one of its flanks."""
+    return clamp(play, theta - half_width, theta + half_width)

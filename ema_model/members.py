@@ -1,6 +1,6 @@
 """Finds the members of a family: each file or folder of a package is one, and states its own facts.
 
-Effects, commands, formats, optimisers, kinds of campaigns, verbs and tabs are found so; adding one is adding a file.
+Effects, commands, formats, optimisers, verbs and tabs are found so; adding one is adding a file.
 """
 
 from __future__ import annotations

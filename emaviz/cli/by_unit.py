@@ -12,7 +12,7 @@ from pathlib import Path
 from ema_model.actuator import Actuator
 from ema_model.errors import InputError, did_you_mean, quoted
 from ema_model.files.opened import FILE_BYTES, listed
-from ema_model.fleet.folders import check_same_type
+from ema_model.fleet.compare import check_same_type
 from ema_model.recordings import Measurement, read_header
 from ema_model.recordings.recording_set import RUN, held_out, is_pattern
 from emaviz.cli import flow, option_values, output

@@ -18,8 +18,7 @@ from ema_model.campaign.kinds import KINDS
 from ema_model.campaign.plan import Plan, load_plan, shipped_plans
 from ema_model.campaign.plan_axes import TaskInputs, inputs_of
 from ema_model.campaign.result import Campaign
-from ema_model.campaign.run import Status, duration, estimate_s, run_plan
-from ema_model.campaign.schedulers import scheduler
+from ema_model.campaign.run import Status, duration, estimate_s, run_plan, scheduler
 from ema_model.campaign.store import Packed, Store
 from ema_model.campaign.task import Task
 from ema_model.comparison import compare

@@ -12,7 +12,7 @@ import msgspec
 
 from ema_model.actuator import Actuator, save_actuator
 from ema_model.errors import InputError, quoted
-from ema_model.fleet.folders import check_same_type, units_in
+from ema_model.fleet.compare import check_same_type, units_in
 from ema_model.fleet.result import UnitsCompared
 from ema_model.recordings import Measurement, read
 from ema_model.recordings.recording_set import long_enough

@@ -12,7 +12,7 @@ import plotly.graph_objects as go
 
 from ema_model import faults
 from ema_model.actuator.parameters import on_axes
-from ema_model.campaign.kinds import benchmark
+from ema_model.campaign import benchmark
 from ema_model.campaign.result import Campaign, made_with
 from ema_model.campaign.store import failed, summaries
 from ema_model.discovery.result import effect_title

@@ -13,8 +13,7 @@ from ema_model.actuator import load_actuator
 from ema_model.challenges import challenges, folder
 from ema_model.challenges.truth import read_toml
 from ema_model.errors import InputError
-from ema_model.fleet.compare import compare_units
-from ema_model.fleet.folders import units_in
+from ema_model.fleet.compare import compare_units, units_in
 from ema_model.practice import KINDS
 from ema_model.recordings import read
 from ema_model.simulated_lives import drawn, worn_life

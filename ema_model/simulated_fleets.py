@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ema_model.actuator import Actuator, load_actuator, parse_actuator, save_actuator
-from ema_model.actuator.write import as_toml
+from ema_model.actuator.file import as_toml
 from ema_model.commands import command
 from ema_model.errors import InputError
 from ema_model.files.opened import shown

@@ -39,10 +39,9 @@ from ema_model.discovery.result import Change, errors_of
 from ema_model.discovery.snapshot import Look, assessed, look_at
 from ema_model.estimation.calibrate import calibration_table, combination_in_words
 from ema_model.faults import NAMES
-from ema_model.identification.run import Identification, identify
+from ema_model.identification.run import Identification, identify, in_one_line
+from ema_model.identification.run import verdict as identified_verdict
 from ema_model.identification.search import Objective
-from ema_model.identification.words import in_one_line
-from ema_model.identification.words import verdict as identified_verdict
 from ema_model.quantities import amount, number, of_signal, variable_title
 from ema_model.recordings import Measurement
 from ema_model.recordings.read import read_measurement

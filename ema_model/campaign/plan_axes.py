@@ -21,7 +21,7 @@ from ema_model.campaign.task import Excitation, File, Simulated, Task
 from ema_model.commands import command
 from ema_model.effects import CATALOGUE, find
 from ema_model.effects.effect import Effect
-from ema_model.effects.user.entries import kind_of, read_entries
+from ema_model.effects.user.torque import kind_of, read_entries
 from ema_model.errors import InputError, did_you_mean, quoted
 from ema_model.estimation import default_free
 from ema_model.faults import vector

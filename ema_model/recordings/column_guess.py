@@ -23,9 +23,9 @@ from ema_model.recordings.column_names import (
     USER,
     Guess,
     Name,
+    known_export,
     readings,
 )
-from ema_model.recordings.exports import known_export
 from ema_model.recordings.units import find_unit
 
 # --- which signals a column may be by its name alone, and in which unit -----------------------------------------------

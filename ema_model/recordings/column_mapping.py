@@ -14,7 +14,7 @@ from ema_model.errors import InputError, did_you_mean
 from ema_model.files.opened import listed, shown
 from ema_model.quantities import SIGNALS
 from ema_model.recordings.column_names import readings
-from ema_model.recordings.formats.clocks import Clocks
+from ema_model.recordings.formats.format import Clocks
 from ema_model.recordings.units import UnitOfMeasure, dimensions_of, find_unit, known_units
 
 # --- which column of a file is which signal, in which unit and with which sign; its text form and its use -------------

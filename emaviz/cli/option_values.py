@@ -158,7 +158,7 @@ def effects_of(arguments: argparse.Namespace, axes: Axes) -> dict[str, dict[str,
     if not arguments.effect:
         return {}
     from ema_model.effects import find  # the kernels take a while to import
-    from ema_model.effects.user.entries import kind_of, read_entries
+    from ema_model.effects.user.torque import kind_of, read_entries
 
     effects: dict[str, dict[str, float]] = {}
     for text in arguments.effect:
@@ -182,7 +182,7 @@ def effects_to_fit(arguments: argparse.Namespace) -> list[str]:
     """Effects of the library that --effect names without any value: their values are what the recordings ask for."""
     if not arguments.effect:
         return []
-    from ema_model.effects.user.entries import kind_of
+    from ema_model.effects.user.torque import kind_of
 
     parts = [text.partition(":") for text in arguments.effect]
     return [name for name, _, rest in parts if not split_at_commas(rest) and kind_of(name) is None]

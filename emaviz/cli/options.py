@@ -403,7 +403,7 @@ def _with_effect(text: str) -> str:
 
 def effect_name(text: str) -> str:
     """The type of an argument that names an effect: of the library, or of the user's own kinds."""
-    kinds = stated_in("ema_model.effects.user.entries", "TITLES")
+    kinds = stated_in("ema_model.effects.user.torque", "TITLES")
     known = [*stated("ema_model.effects", "EFFECT"), *kinds]
     # A model may hold an effect several times: cogging_torque_2.
     if not (

@@ -8,7 +8,7 @@ from pathlib import Path
 from ema_model.actuator import load_actuator
 from ema_model.effects import CATALOGUE, Effect
 from ema_model.effects.effect import FAMILIES
-from ema_model.effects.user.entries import KEYS, TITLES
+from ema_model.effects.user.torque import KEYS, TITLES
 from ema_model.errors import InputError, quoted
 from ema_model.files.written import whole_file
 from ema_model.quantities import VARIABLES, Axes

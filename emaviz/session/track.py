@@ -15,9 +15,9 @@ import msgspec
 import numpy as np
 
 from ema_model import faults
-from ema_model.actuator.write import as_toml
+from ema_model.actuator.file import as_toml
 from ema_model.errors import InputError, quoted
-from ema_model.files.arriving import LOOK_S, Watched
+from ema_model.files.opened import LOOK_S, Watched
 from ema_model.identification.run import Progress
 from ema_model.recordings import read
 from ema_model.recordings.recording_set import recordings_in

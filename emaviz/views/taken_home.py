@@ -7,7 +7,7 @@ from collections.abc import Iterator
 
 import plotly.graph_objects as go
 
-from ema_model.exports.result import Export, TargetProof
+from ema_model.exports.replay import Export, TargetProof
 from ema_model.quantities import of_signal
 from emaviz.figures import theme
 from emaviz.figures.theme import line

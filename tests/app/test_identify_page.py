@@ -14,9 +14,8 @@ from ema_model.actuator import load_actuator
 from ema_model.commands import command
 from ema_model.errors import InputError
 from ema_model.faults import performance_coefficient, vector
-from ema_model.identification.run import ALGORITHMS, Progress
+from ema_model.identification.run import ALGORITHMS, Progress, facts, way_sentences, why_best
 from ema_model.identification.search import slices, ways
-from ema_model.identification.words import facts, way_sentences, why_best
 from ema_model.quantities import amount
 from ema_model.recordings import write_measurement
 from ema_model.recordings.measurement import Sensors

@@ -9,7 +9,7 @@ import pytest
 from support.documents import result_of
 
 from ema_model.effects import CATALOGUE
-from ema_model.effects.user.entries import KEYS
+from ema_model.effects.user.torque import KEYS
 from emaviz.cli import main
 from emaviz.report import effects as reference
 from emaviz.text.html import mathml

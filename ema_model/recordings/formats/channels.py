@@ -16,8 +16,7 @@ from numpy.typing import NDArray
 from ema_model.errors import InputError
 from ema_model.files.opened import COLUMNS, listed, refusal, shown
 from ema_model.recordings.column_names import QUANTITIES, is_time, readings
-from ema_model.recordings.formats.clocks import Clocks, between, covered, is_state, main_clock, rule, usable
-from ema_model.recordings.formats.format import check_size
+from ema_model.recordings.formats.format import Clocks, between, check_size, covered, is_state, main_clock, rule, usable
 from ema_model.recordings.units import UnitOfMeasure, dimensions_of, find_unit
 
 # --- channels as loggers keep them: each with its unit and, where the format has them, with a clock of its own --------

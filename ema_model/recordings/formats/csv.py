@@ -22,9 +22,18 @@ from ema_model.quantities import SIGNALS
 from ema_model.recordings.column_names import is_time, readings
 from ema_model.recordings.formats.arrow import as_numpy, mask
 from ema_model.recordings.formats.channels import beside_time, tokens, with_unit
-from ema_model.recordings.formats.clocks import Clocks, between, covered, is_state, main_clock, rule
-from ema_model.recordings.formats.format import Array, Columns, Format, check_size
-from ema_model.recordings.formats.stamps import is_stamp, seconds
+from ema_model.recordings.formats.format import (
+    Array,
+    Clocks,
+    Columns,
+    Format,
+    between,
+    check_size,
+    covered,
+    is_state,
+    main_clock,
+    rule,
+)
 from ema_model.recordings.formats.text_layout import (
     SEPARATORS,
     Head,
@@ -32,8 +41,10 @@ from ema_model.recordings.formats.text_layout import (
     Layout,
     find_layout,
     is_number,
+    is_stamp,
     lines_of,
     read_head,
+    seconds,
     split,
 )
 from ema_model.recordings.units import find_unit

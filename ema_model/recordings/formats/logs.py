@@ -16,8 +16,7 @@ from ema_model.files import sandbox
 from ema_model.files.opened import listed, refusal, shown
 from ema_model.recordings.formats import channels
 from ema_model.recordings.formats.channels import Log, NoLog, told, with_own_clocks, with_runs
-from ema_model.recordings.formats.clocks import Clocks
-from ema_model.recordings.formats.format import Array, Columns, Format
+from ema_model.recordings.formats.format import Array, Clocks, Columns, Format
 from ema_model.recordings.formats.npz import check_lengths
 
 _PATIENCE_S = 20.0  # for one question; some libraries never end

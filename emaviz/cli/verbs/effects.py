@@ -37,7 +37,7 @@ def documents() -> tuple[type, ...]:
 def run(arguments: argparse.Namespace) -> int:
     """Prints the list or the explanation, or writes the pages."""
     from ema_model.effects import CATALOGUE, find
-    from ema_model.effects.user.entries import KEYS, TITLES
+    from ema_model.effects.user.torque import KEYS, TITLES
     from emaviz.cli.output import write_json
 
     if arguments.name in KEYS:
@@ -64,7 +64,7 @@ def run(arguments: argparse.Namespace) -> int:
 
 def explain_users(name: str) -> str:
     """What an effect of the user's own is made of, for a terminal."""
-    from ema_model.effects.user.entries import KEYS, TITLES
+    from ema_model.effects.user.torque import KEYS, TITLES
 
     width = max(map(len, KEYS[name]))
     entries = [f"  {key:{width}}  {meaning}" for key, meaning in KEYS[name].items()]
@@ -72,7 +72,7 @@ def explain_users(name: str) -> str:
 
 
 def _users_facts(name: str) -> EffectJson:
-    from ema_model.effects.user.entries import KEYS, TITLES
+    from ema_model.effects.user.torque import KEYS, TITLES
 
     return {"name": name, "title": TITLES[name], "keys": dict(KEYS[name])}
 

@@ -37,7 +37,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def documents() -> tuple[type, ...]:
     """What --json holds."""
-    from ema_model.exports.result import Export
+    from ema_model.exports.replay import Export
     from ema_model.result import json_type
 
     return (json_type(Export),)

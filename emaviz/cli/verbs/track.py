@@ -138,7 +138,7 @@ def _watch(
     arguments: argparse.Namespace, actuator: Actuator, thresholds: Mapping[str, float], progress: output.Progress
 ) -> None:
     """Until it is interrupted; a file that cannot be used is told once and left out, and may be replaced."""
-    from ema_model.files.arriving import LOOK_S, Watched
+    from ema_model.files.opened import LOOK_S, Watched
     from ema_model.recordings.recording_set import recordings_in
     from ema_model.tracking.flights import check_order, in_order
     from ema_model.tracking.trends import LEAST_FLIGHTS

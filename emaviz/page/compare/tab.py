@@ -10,8 +10,7 @@ import msgspec
 import viser
 
 from ema_model.actuator.describe import DRIVES
-from ema_model.actuator.keys import KINDS
-from ema_model.actuator.parameters import on_axes
+from ema_model.actuator.parameters import KINDS, on_axes
 from ema_model.comparison import Comparison
 from ema_model.errors import InputError
 from ema_model.quantities import KINDS as AXES
@@ -233,7 +232,7 @@ def _about(one: Question) -> Html:
     return html("<div {}>{}{}. Left empty: {}.{}</div>", _BELOW, one.meaning, other, one.empty, usual)
 
 
-# --- which recordings are held out, to judge the model by ------------------------------------------------------------
+# --- which recordings are held out, to judge the model by -------------------------------------------------------------
 
 
 class HeldOutControls:

@@ -18,8 +18,7 @@ from ema_model.discovery.words import value as as_fitted
 from ema_model.effects import Effect, find
 from ema_model.effects.effect import FAMILIES
 from ema_model.effects.user import UserEffect, user_torque
-from ema_model.effects.user.beginnings import Size
-from ema_model.effects.user.expression import FUNCTIONS, VARIABLES
+from ema_model.effects.user.expression import FUNCTIONS, VARIABLES, Size
 from ema_model.effects.user.torque import RANGE
 from ema_model.errors import InputError
 from ema_model.estimation import Calibrated

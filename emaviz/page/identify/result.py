@@ -10,10 +10,9 @@ import numpy as np
 import viser
 
 from ema_model.faults import FAULTS, HEALTHY, NAMES
-from ema_model.identification.run import ALGORITHMS, algorithm_title
+from ema_model.identification.run import ALGORITHMS, CORRECTED, algorithm_title, landscape_words, way_sentences
 from ema_model.identification.search import POINTS, Landscape, Way
 from ema_model.identification.uncertainty import Suggestion
-from ema_model.identification.words import CORRECTED, landscape_words, way_sentences
 from emaviz.figures import identification
 from emaviz.figures.identification import LiveConvergence, LiveFit, Row, colour, fault_bars, table
 from emaviz.page.identify import WORKSPACE

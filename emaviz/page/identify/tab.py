@@ -11,8 +11,7 @@ import viser
 
 from ema_model.errors import InputError, quoted
 from ema_model.faults import vector
-from ema_model.identification.run import ALGORITHMS
-from ema_model.identification.words import facts, in_one_line, verdict, why_best
+from ema_model.identification.run import ALGORITHMS, facts, in_one_line, verdict, why_best
 from ema_model.recordings import write_measurement
 from ema_model.simulation.plant import FITNESSES
 from emaviz.figures.identification import Row, named

@@ -26,8 +26,7 @@ from ema_model.discovery.words import effect_title, verification
 from ema_model.effects import CATALOGUE
 from ema_model.effects.user import Expression, UserEffect, parse
 from ema_model.errors import InputError, quoted
-from ema_model.exports.replay import EXACT
-from ema_model.exports.result import TargetProof
+from ema_model.exports.replay import EXACT, TargetProof
 from ema_model.faults import NAMES
 from ema_model.files.written import whole_file
 from ema_model.quantities import in_sentence

@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike
 
 from ema_model.actuator import Actuator, load_actuator
 from ema_model.actuator.actuator import sentences
-from ema_model.actuator.write import as_toml
+from ema_model.actuator.file import as_toml
 from ema_model.challenges import Challenge, challenges, folder, opened, sealed_challenge
 from ema_model.challenges.challenge import SUFFIX
 from ema_model.challenges.truth import SENSORS, Truth, read_truth, seal, unseal

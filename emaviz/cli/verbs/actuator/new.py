@@ -24,7 +24,7 @@ _TEXTS = ("expression", "variable", "modulator")  # of a user's effect
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """The kinds, the values that are known, effects, and how recordings are read."""
-    kinds, axes = stated_in("ema_model.actuator.keys", "KINDS"), stated_in("ema_model.quantities", "KINDS")
+    kinds, axes = stated_in("ema_model.actuator.parameters", "KINDS"), stated_in("ema_model.quantities", "KINDS")
     parser.add_argument("file", type=options.SAVED_ACTUATOR, metavar="FILE.toml", help="the file to write")
     parser.add_argument(
         "--from",
@@ -109,7 +109,7 @@ def run(arguments: argparse.Namespace) -> int:
 
 def _from_model(document: dict[str, Any], arguments: argparse.Namespace) -> list[str]:
     """Puts what an MJCF model says into the tables, where no option says otherwise; notes."""
-    from ema_model.exports.from_mjcf import joint_tables
+    from ema_model.exports.mjcf import joint_tables
 
     tables, controller, drive, notes = joint_tables(arguments.model)
     for section, table in tables.items():
@@ -127,7 +127,7 @@ def _kinds(arguments: argparse.Namespace) -> tuple[str, str, list[str]]:
     What is not known of a loop is left to inverse dynamics.
     """
     from ema_model.actuator.describe import DRIVES
-    from ema_model.actuator.keys import KINDS
+    from ema_model.actuator.parameters import KINDS
 
     controller, drive = arguments.controller, arguments.drive
     if controller is None:
@@ -203,7 +203,7 @@ def _gear(arguments: argparse.Namespace) -> dict[str, Any] | None:
 def _effect(text: str) -> tuple[str, dict[str, Any]]:
     """The table of --effect NAME:param=value±tolerance,…"""
     from ema_model.actuator.describe import entry_of, number_of
-    from ema_model.effects.user.entries import kind_of
+    from ema_model.effects.user.torque import kind_of
     from emaviz.cli import option_values
 
     name, _, rest = text.partition(":")

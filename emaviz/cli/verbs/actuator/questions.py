@@ -6,8 +6,7 @@ import argparse
 from typing import Any
 
 from ema_model.actuator.describe import DRIVES, actuator_axes, asked, entry_of, gear_of, unanswered
-from ema_model.actuator.keys import KINDS
-from ema_model.actuator.parameters import facts_of, on_axes
+from ema_model.actuator.parameters import KINDS, facts_of, on_axes
 from ema_model.errors import InputError
 from ema_model.quantities import KINDS as AXES
 from emaviz.cli.options import SAMPLE_RATE

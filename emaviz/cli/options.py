@@ -322,7 +322,7 @@ def add_outputs(parser: argparse.ArgumentParser, what: str) -> None:
 
 
 def add_units(parser: argparse.ArgumentParser) -> None:
-    """--by and --unit; `by_unit` takes what they give."""
+    """--by and --unit; `flow` takes what they give."""
     parser.add_argument(
         "--by",
         metavar="unit|COLUMN",

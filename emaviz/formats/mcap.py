@@ -85,7 +85,7 @@ def opened(path: str, most_bytes: int) -> Iterator[Log]:
     """The numbers of all topics; NoLog for what rerun cannot read."""
     from rerun.chunk import McapReader
 
-    from emaviz.formats.chunks import Chunks
+    from emaviz.formats.rrd import Chunks
 
     with open(path, "rb") as file:
         check(file, most_bytes)

@@ -16,7 +16,7 @@ import viser
 
 from ema_model.actuator import load_actuator
 from ema_model.members import classes_in, members
-from ema_model.simulation import run
+from ema_model.simulation import plant
 from emaviz.page import compare, explore
 from emaviz.page.charts import add_chart_tools
 from emaviz.page.correction import Correction
@@ -163,7 +163,7 @@ class App:
         self._build()
         self._first = threading.Event()
         self.first_picture_s = 0.0
-        if not run.can_be_explored(actuator):
+        if not plant.can_be_explored(actuator):
             self._first.set()  # there will be no picture of a run
         events = self.session.events  # what tabs draw of a run is posted before
         events.simulated.connect(lambda _: self.screen.post("first picture", lambda: self._drawn(started)))

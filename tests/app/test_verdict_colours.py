@@ -12,11 +12,10 @@ from support.discovered import with_cogging
 
 from emaviz.page.compare.result import headline
 from emaviz.page.discover.result import answer
-from emaviz.report.html_document import Figures
 from emaviz.text.results import MEANINGS, of_discovery, of_units
 from emaviz.views import discovery
 from emaviz.views.comparison import VIEW
-from emaviz.views.export import markup
+from emaviz.views.export import Figures, markup
 
 GREEN = MEANINGS["good"]
 

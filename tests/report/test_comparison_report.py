@@ -19,9 +19,8 @@ from ema_model.errors import InputError
 from ema_model.recordings.health import Finding, Health
 from emaviz.page.compare.result import numbers
 from emaviz.recording.writer import written
-from emaviz.report.html_document import Figures
 from emaviz.views.comparison import VIEW
-from emaviz.views.export import export, markup
+from emaviz.views.export import Figures, export, markup
 
 HOSTILE = '</script><script>window.bad = 1</script><img src="x" onerror="window.bad = 2">&amp;'
 

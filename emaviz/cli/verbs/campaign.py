@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from ema_model.campaign import Status
     from ema_model.campaign.plan import Plan
     from emaviz.cli import output
-    from emaviz.cli.documents import PlannedJson
+    from emaviz.cli.output import PlannedJson
 
 HELP = "compute the many tasks of a plan, in processes or on a Dask cluster; status and report of one"
 PLACE = 11
@@ -59,7 +59,7 @@ def documents() -> tuple[type, ...]:
     """What --json holds: of a campaign, and of what one would compute."""
     from ema_model.campaign.result import Campaign
     from ema_model.result import json_type
-    from emaviz.cli.documents import InterruptedCampaignJson, PlannedJson
+    from emaviz.cli.output import InterruptedCampaignJson, PlannedJson
 
     return (json_type(Campaign, InterruptedCampaignJson), PlannedJson)
 

@@ -58,9 +58,9 @@ def run(arguments: argparse.Namespace) -> int:
 
     actuator = option_values.actuator_of(arguments)
     if arguments.by or arguments.unit:
-        from emaviz.cli import by_unit
+        from emaviz.cli.flow import run_by_unit
 
-        return by_unit.run(arguments, actuator)
+        return run_by_unit(arguments, actuator)
     k, weights = option_values.faults_of(arguments, actuator.faults), option_values.weights_of(arguments.signals)
     effects = option_values.effects_of(arguments, actuator.axes)
     to_fit = option_values.effects_to_fit(arguments) if arguments.calibrate else []

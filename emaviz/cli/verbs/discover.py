@@ -35,7 +35,7 @@ def documents() -> tuple[type, ...]:
     from ema_model.discovery import Discovery
     from ema_model.fleet.discovery import UnitsDiscovered
     from ema_model.result import json_type
-    from emaviz.cli.documents import SavedModelJson
+    from emaviz.cli.output import SavedModelJson
 
     return (json_type(Discovery, SavedModelJson), json_type(UnitsDiscovered))
 
@@ -47,9 +47,9 @@ def run(arguments: argparse.Namespace) -> int:
     actuator = option_values.actuator_of(arguments)
     signals = _CURRENT_ONLY if arguments.signals == "current" else None
     if arguments.by or arguments.unit:
-        from emaviz.cli import by_unit
+        from emaviz.cli.flow import run_discovery
 
-        return by_unit.run_discovery(arguments, actuator, signals)
+        return run_discovery(arguments, actuator, signals)
 
     def compute(fitted: list[Measurement], held: list[Measurement], progress: output.Progress) -> flow.Answer:
         # These take a second: recordings are refused before.

@@ -12,7 +12,7 @@ from emaviz.cli.options import add_json, effect_name
 
 if TYPE_CHECKING:
     from ema_model.effects import Effect, Parameter
-    from emaviz.cli.documents import EffectJson, EffectParameterFactsJson
+    from emaviz.cli.output import EffectJson, EffectParameterFactsJson
 
 HELP = "list the physical effects that can be added to the models, or explain one"
 PLACE = 8
@@ -29,7 +29,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def documents() -> tuple[type, ...]:
     """What --json holds."""
-    from emaviz.cli.documents import EffectsJson
+    from emaviz.cli.output import EffectsJson
 
     return (EffectsJson,)
 
@@ -46,7 +46,7 @@ def run(arguments: argparse.Namespace) -> int:
         return 0
     chosen = [find(arguments.name)] if arguments.name else list(CATALOGUE.values())
     if arguments.html:
-        from emaviz.report.effects import write_effects_reference
+        from emaviz.views.effects import write_effects_reference
 
         print(f"{arguments.html}: {len(write_effects_reference(arguments.html))} pages; begin with index.html")
     elif arguments.name:

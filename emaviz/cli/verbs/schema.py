@@ -10,7 +10,7 @@ from typing import Any
 from ema_model.errors import InputError, did_you_mean, quoted
 from ema_model.members import names
 from emaviz.cli import COMMANDS
-from emaviz.cli.analysis import verb_of
+from emaviz.cli.parser import verb_of
 
 HELP = "print what the fields of a command's --json mean, as JSON Schema"
 PLACE = 14
@@ -55,7 +55,7 @@ def schema_of(name: str, verb: Any) -> dict[str, Any]:
     """JSON Schema (2020-12) of a command's --json: the head, and one of its documents."""
     import msgspec
 
-    from emaviz.cli.documents import HeadJson
+    from emaviz.cli.output import HeadJson
 
     (head, *kinds), parts = msgspec.json.schema_components((HeadJson, *verb.documents()), ref_template="#/$defs/{name}")
     return {

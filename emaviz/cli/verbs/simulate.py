@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
     from ema_model.actuator import Actuator
     from ema_model.recordings import Measurement
-    from emaviz.cli.documents import SimulatedJson
+    from emaviz.cli.output import SimulatedJson
 
 HELP = "simulate one run of the reference or the monitor model and write it as a recording"
 PLACE = 2
@@ -47,7 +47,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def documents() -> tuple[type, ...]:
     """What --json holds."""
-    from emaviz.cli.documents import SimulatedJson
+    from emaviz.cli.output import SimulatedJson
 
     return (SimulatedJson,)
 

@@ -56,7 +56,7 @@ def documents() -> tuple[type, ...]:
     """What --json holds."""
     from ema_model.result import json_type
     from ema_model.tracking.track import Tracked
-    from emaviz.cli.documents import InterruptedTrackJson
+    from emaviz.cli.output import InterruptedTrackJson
 
     return (json_type(Tracked, InterruptedTrackJson),)
 

@@ -20,7 +20,7 @@ from ema_model.estimation.floor import BAND_SIGMAS
 from ema_model.faults import HEALTHY
 from ema_model.quantities import VARIABLES
 from ema_model.recordings import Measurement
-from emaviz.figures import campaign, lines, overlays
+from emaviz.figures import campaign, lines, runs
 from emaviz.figures import comparison as comparison_figures
 from emaviz.figures.lines import Lines, Window, clipped
 from emaviz.figures.theme import why_missing
@@ -35,9 +35,8 @@ from emaviz.page.workspaces import Page
 from emaviz.scene.playback import Motion, motion
 from emaviz.server.viser_private import selector_of
 from emaviz.session.files import Opened
-from emaviz.text.html import Html, add_html, begin, html, joined, note, unescaped
+from emaviz.text.html import Html, add_html, begin, explained, html, joined, note, unescaped
 from emaviz.text.results import folded, large, of_comparison, shown, warned
-from emaviz.text.terms import explained
 
 # --- a compared recording on the 3D actuator: as measured, the screw glowing where the model fails --------------------
 
@@ -201,8 +200,8 @@ class ComparePlots:
         """What the plots over time draw, from above."""
         signal = self._signal_shown(view)
         if view.together:
-            return overlays.together(view.comparison, signal)
-        return overlays.compared(view.comparison, signal, view.recording)
+            return runs.together(view.comparison, signal)
+        return runs.compared(view.comparison, signal, view.recording)
 
     def _lines(self, place: int) -> Lines | None:
         found = self._every(self._view) if self._view is not None else []
@@ -272,7 +271,7 @@ def telling_window(view: View) -> Window | None:
     one = view.comparison.recordings[view.recording]
     if view.together or view.comparison.residuals.is_map:
         return None
-    window = overlays.event_of_recording(one)
+    window = runs.event_of_recording(one)
     if window is None or window[1] - window[0] > _TELLING * float(one.time_s[-1] - one.time_s[0]):
         return None
     return window

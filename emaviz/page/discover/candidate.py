@@ -34,8 +34,7 @@ from emaviz.page.workspaces import Page
 from emaviz.server.viser_private import id_of
 from emaviz.session.discover.discovering import Discovering, Preview, Typed, typed
 from emaviz.session.settings import number as setting_number
-from emaviz.text.html import BOX, WAITS, Html, add_html, boxed, html, joined, mathml, note, unescaped
-from emaviz.text.terms import explained
+from emaviz.text.html import BOX, WAITS, Html, add_html, boxed, explained, html, joined, mathml, note, unescaped
 
 # --- texts and styles of the Discover tab's cards: what each candidate would do, in one glance ------------------------
 

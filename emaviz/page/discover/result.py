@@ -44,9 +44,8 @@ from emaviz.scene.playback import motion
 from emaviz.session.discover import source
 from emaviz.session.discover.discovering import Discovering
 from emaviz.session.discover.history import Entry
-from emaviz.text.html import BOX, Html, add_html, begin, boxed, html, joined, note, waiting
+from emaviz.text.html import BOX, Html, add_html, begin, boxed, explained, html, joined, note, waiting
 from emaviz.text.results import folded, large, of_discovery, shown, warned
-from emaviz.text.terms import explained
 
 # --- suggested next test: the command and load that tell rivals apart; into Explore, or as CSV for a rig --------------
 

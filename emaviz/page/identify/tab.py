@@ -31,8 +31,7 @@ from emaviz.session.identify import Race
 from emaviz.session.inputs import ResultFiles
 from emaviz.session.session_file import Part
 from emaviz.session.settings import SLIDERS, Settings, limits, taken
-from emaviz.text.html import Html, add_html, html, joined
-from emaviz.text.terms import explained
+from emaviz.text.html import Html, add_html, explained, html, joined
 
 # --- the Identify tab: what is identified, by which algorithms, and the race that one watches -------------------------
 

@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from ema_model.actuator import Actuator
 
 if TYPE_CHECKING:
-    from emaviz.cli.documents import CheckedActuatorJson
+    from emaviz.cli.output import CheckedActuatorJson
 
 HELP = "say what an actuator file lacks, what is hard to believe, and what a recording cannot tell of it"
 PLACE = 2
@@ -28,7 +28,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def documents() -> tuple[type, ...]:
     """What --json holds."""
-    from emaviz.cli.documents import CheckedActuatorJson
+    from emaviz.cli.output import CheckedActuatorJson
 
     return (CheckedActuatorJson,)
 

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, cast
 from emaviz.cli import options
 
 if TYPE_CHECKING:
-    from emaviz.cli.documents import KeysJson
+    from emaviz.cli.output import KeysJson
 
 HELP = "print the reference of every key of an actuator file, as Markdown"
 PLACE = 3
@@ -22,7 +22,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def documents() -> tuple[type, ...]:
     """What --json holds."""
-    from emaviz.cli.documents import KeysJson
+    from emaviz.cli.output import KeysJson
 
     return (KeysJson,)
 

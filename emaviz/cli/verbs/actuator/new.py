@@ -14,7 +14,7 @@ from emaviz.cli import options
 from emaviz.cli.options import FINITE, SAMPLE_RATE
 
 if TYPE_CHECKING:
-    from emaviz.cli.documents import NewActuatorJson
+    from emaviz.cli.output import NewActuatorJson
 
 HELP = "write an actuator file with comments, from options or from answers on the terminal"
 PLACE = 1
@@ -72,7 +72,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def documents() -> tuple[type, ...]:
     """What --json holds."""
-    from emaviz.cli.documents import NewActuatorJson
+    from emaviz.cli.output import NewActuatorJson
 
     return (NewActuatorJson,)
 

@@ -14,8 +14,8 @@ from ema_model.files.written import whole_file
 from ema_model.quantities import VARIABLES, Axes
 from ema_model.simulation.with_effect import EffectRuns
 from emaviz.figures.discovery import effect_residual_legend, pictures
-from emaviz.report.html_document import escape, paragraph, table
 from emaviz.text.html import mathml
+from emaviz.views.export import escape, paragraph, table
 
 _STYLE = (
     ":root{color-scheme:light dark}"

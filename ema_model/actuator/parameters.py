@@ -12,7 +12,7 @@ from ema_model.faults import FAULTS
 from ema_model.quantities import MOTOR, USER, Axes, Side, as_number, in_sentence, parameter_title, unit_of
 
 # --- the keys of an actuator file besides its parameters, with what they mean: the reader knows no others -------------
-# The parameters themselves, with their facts, stand in `parameters`; effects in their own files.
+# The parameters themselves, with their facts, stand below; effects in their own files.
 
 HEAD = {
     "schema": "1, the version of this format",

@@ -318,7 +318,7 @@ def beneath(frozen: Array, shown: Array) -> Array:
     return np.where(np.isfinite(frozen), frozen, shown)
 
 
-# A drag of uPlot's own would zoom what is drawn; `emaviz.page.measure` zooms all charts, in full resolution.
+# A drag of uPlot's own would zoom what is drawn; `emaviz.page.charts` zooms all charts, in full resolution.
 CURSOR: Any = {"sync": {"key": "time"}, "drag": {"x": False, "y": False}}
 
 

@@ -23,8 +23,8 @@ from emaviz.page.tab import Standing
 from emaviz.page.workspaces import Page, Workspace
 from emaviz.server.safe_server import RESULTS
 from emaviz.session.campaigns import REPORT, Campaigns, Computing
-from emaviz.session.inputs import Provenance
 from emaviz.session.jobs import Worker
+from emaviz.session.session_file import Provenance
 from emaviz.text.html import Html, add_html, begin, html, joined, said
 from emaviz.views.campaign import answers, case_in_words, counted_px, errors_drawn, in_words
 

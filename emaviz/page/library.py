@@ -20,7 +20,7 @@ from emaviz.page.window_layout import COLUMNS, NEXT_COLUMN
 from emaviz.page.workspaces import Page, Workspace
 from emaviz.scene.playback import motion
 from emaviz.server.viser_private import selector_of
-from emaviz.session.library import Library
+from emaviz.session.explore import Library
 from emaviz.text.html import BOX, add_html, html, mathml, note, unescaped
 
 # --- an effect opened: its text, its equation, and what each parameter does -------------------------------------------

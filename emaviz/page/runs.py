@@ -20,7 +20,7 @@ from emaviz.figures import comparison, runs
 from emaviz.figures.identification import named
 from emaviz.figures.lines import Lines, Window, clipped
 from emaviz.page.campaigns import CampaignControls
-from emaviz.page.measure import marked
+from emaviz.page.charts import marked
 from emaviz.page.panel import Example, recording_link
 from emaviz.page.share import Place, share_line
 from emaviz.page.tab import Shared, Tab
@@ -33,9 +33,8 @@ from emaviz.scene.playback import motion
 from emaviz.session import session_file
 from emaviz.session.compare import Comparing
 from emaviz.session.data_folder import SESSION_SUFFIX
-from emaviz.session.files import UPLOADED
+from emaviz.session.files import UPLOADED, RecordedRuns
 from emaviz.session.jobs import Worker
-from emaviz.session.recorded_runs import RecordedRuns
 from emaviz.session.session_file import Part
 from emaviz.text.html import Html, add_html, begin, boxed, explained, html, joined, said
 

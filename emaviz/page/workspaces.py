@@ -13,8 +13,7 @@ import viser
 
 from ema_model.errors import InputError
 from emaviz.page import charts, window_layout
-from emaviz.page.charts import ChartHeights
-from emaviz.page.measure import Measuring
+from emaviz.page.charts import ChartHeights, Measuring
 from emaviz.page.style import unseen
 from emaviz.page.window_layout import Docked
 from emaviz.server.access import say_beside

@@ -22,8 +22,8 @@ from ema_model.recordings.measurement import Measurement
 from ema_model.result import Result
 from emaviz.session.compare import Comparing
 from emaviz.session.files import Opened, all_measured
-from emaviz.session.inputs import Inputs, Provenance
 from emaviz.session.jobs import Job, Run, Signal, Worker, aside
+from emaviz.session.session_file import Inputs, Provenance
 from emaviz.session.settings import taken
 
 

@@ -31,8 +31,8 @@ from ema_model.recordings import Measurement
 from ema_model.result import Result, restored, stored
 from emaviz.session.data_folder import DataFolder
 from emaviz.session.explore import Session
-from emaviz.session.inputs import Inputs, Room, digest
 from emaviz.session.jobs import Job, Run, Signal, Steps, Stopped, Tell, elsewhere
+from emaviz.session.session_file import Inputs, Room, digest
 from emaviz.session.settings import taken
 
 _HEADER = "campaign.json"

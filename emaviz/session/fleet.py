@@ -21,8 +21,8 @@ from emaviz.session import files as session_files
 from emaviz.session.data_folder import DataFolder
 from emaviz.session.explore import Session
 from emaviz.session.files import Practice, side_file_of
-from emaviz.session.inputs import Inputs, Provenance, Whole, digest, version_with_side
 from emaviz.session.jobs import Job, Run, Signal, Worker
+from emaviz.session.session_file import Inputs, Provenance, Whole, digest, version_with_side
 from emaviz.session.settings import taken
 
 

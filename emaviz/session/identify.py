@@ -31,8 +31,8 @@ from ema_model.quantities import amount
 from ema_model.recordings import Measurement
 from ema_model.result import restored, stored
 from ema_model.simulation import plant
-from emaviz.session.inputs import Inputs, Provenance, Whole
 from emaviz.session.jobs import Job, Run, Signal, Steps, Worker, elsewhere
+from emaviz.session.session_file import Inputs, Provenance, Whole
 from emaviz.session.settings import SLIDERS, Settings, title
 
 if TYPE_CHECKING:

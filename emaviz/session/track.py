@@ -29,8 +29,8 @@ from ema_model.tracking.trends import LEAST_FLIGHTS
 from emaviz.session.data_folder import DataFolder
 from emaviz.session.explore import Session
 from emaviz.session.files import Practice, side_file_of
-from emaviz.session.inputs import Inputs, Provenance, Room, version_with_side
 from emaviz.session.jobs import RESTED, Job, Run, Signal, Stopped, Worker
+from emaviz.session.session_file import Inputs, Provenance, Room, version_with_side
 from emaviz.session.settings import number, taken
 
 # --- what a session's file holds of Track -----------------------------------------------------------------------------

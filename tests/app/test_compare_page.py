@@ -23,7 +23,7 @@ from emaviz.page.app import App
 from emaviz.page.compare.result import View
 from emaviz.page.compare.tab import CompareTab
 from emaviz.page.explore.tab import ExploreTab
-from emaviz.page.identify.tab import IdentifyTab
+from emaviz.page.identify import IdentifyTab
 from emaviz.page.track import TrackTab
 
 pytestmark = pytest.mark.browser

@@ -20,7 +20,7 @@ from emaviz.figures.discovery import equation
 from emaviz.page.discover import candidate
 from emaviz.page.discover.candidate import about_fault
 from emaviz.page.discover.result import answer
-from emaviz.session.discover.source import agrees, document_of
+from emaviz.session.discovery_source import agrees, document_of
 from emaviz.text.results import MEANINGS
 
 pytestmark = pytest.mark.long

@@ -22,7 +22,7 @@ from emaviz.page.discover.result import _SHOWN, as_csv, run_of
 from emaviz.page.discover.tab import STEPS, step
 from emaviz.recording.read import read
 from emaviz.scene.playback import motion
-from emaviz.session.discover.source import agrees, document_of
+from emaviz.session.discovery_source import agrees, document_of
 
 EASY = "first_bench_run"
 

@@ -20,8 +20,8 @@ from emaviz.page.discover import candidate
 from emaviz.page.discover.result import answer
 from emaviz.session import session_file
 from emaviz.session.data_folder import DataFolder
-from emaviz.session.discover.history import KEPT, WHOLE, Entries, StoredStory, Telling
-from emaviz.session.discover.source import Recipe, agrees, document_of, sensors_of, truth_of
+from emaviz.session.discovery_history import KEPT, WHOLE, Entries, StoredStory, Telling
+from emaviz.session.discovery_source import Recipe, agrees, document_of, sensors_of, truth_of
 from emaviz.session.session_file import Part
 from emaviz.session.settings import Settings
 

@@ -10,7 +10,7 @@ from support.representative import first_of
 
 from emaviz.page.app import App
 from emaviz.page.explore.tab import ExploreTab
-from emaviz.page.identify.tab import PLANT
+from emaviz.page.identify import PLANT
 from emaviz.text.html import said
 
 pytestmark = pytest.mark.browser

@@ -23,7 +23,7 @@ from ema_model.recordings.read import read_measurement
 from ema_model.simulation.run import Run, simulate_reference
 from emaviz.figures import identification
 from emaviz.figures.identification import Row, table
-from emaviz.page.identify.result import at_iteration, telling
+from emaviz.page.identify import at_iteration, telling
 from emaviz.recording.read import read
 from emaviz.session.explore import Session
 from emaviz.session.identify import MOST_FRAMES, Track, ends

@@ -18,7 +18,7 @@ from emaviz.page.app import App
 from emaviz.page.discover.tab import DiscoverTab
 from emaviz.page.explore.tab import ExploreTab
 from emaviz.page.runs import _card
-from emaviz.session.recorded_runs import RecordedRuns, recovered
+from emaviz.session.files import RecordedRuns, recovered
 from emaviz.text.html import Html, html, html_escape, joined, said
 
 RAW = ("<iframe srcdoc", "<img", "<script", 'href="javascript')

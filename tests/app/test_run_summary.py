@@ -11,7 +11,7 @@ from support.on_page import wait_until
 
 from ema_model.quantities import with_uncertainty
 from emaviz.page.discover.tab import step
-from emaviz.session.recorded_runs import RecordedRuns, summary
+from emaviz.session.files import RecordedRuns, summary
 
 
 @pytest.mark.parametrize(

@@ -22,7 +22,7 @@ from ema_model.simulation.run import Run, simulate_reference
 from emaviz.cli import main
 from emaviz.session.compare import Comparing
 from emaviz.session.data_folder import DataFolder
-from emaviz.session.discover.source import DiscoverySource
+from emaviz.session.discovery_source import DiscoverySource
 from emaviz.session.explore import Session
 
 BALL_SCREW = """

@@ -118,7 +118,7 @@ _CALLED = {
 def user_torque(text: str, ranges: Mapping[str, tuple[float, float]] | None = None) -> UserEffect:
     """The effect of a torque in N·m, added at the shaft; it is registered, so that models find it by its name.
 
-    text: see `expression.parse`; its parameters are 1 by default (or the nearest to it) in `ranges`, else −1000 … 1000.
+    text: see `parse`; its parameters are 1 by default (or the nearest to it) in `ranges`, else −1000 … 1000.
     t counts from the recording's start.
     The same expression given again takes the place of the one before.
     Raises InputError for a text that is no expression, and for ranges of no parameter or without width.

@@ -24,9 +24,9 @@ from emaviz.figures import campaign, lines, runs
 from emaviz.figures import comparison as comparison_figures
 from emaviz.figures.lines import Lines, Window, clipped
 from emaviz.figures.theme import why_missing
+from emaviz.page.charts import hint, marked
 from emaviz.page.compare import WORKSPACE
 from emaviz.page.compare.columns import MappingStep
-from emaviz.page.measure import hint, marked
 from emaviz.page.panel import Cleared, Example
 from emaviz.page.playback import PlaybackStrip
 from emaviz.page.style import IN_PAIRS

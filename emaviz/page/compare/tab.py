@@ -19,14 +19,12 @@ from ema_model.recordings import SIGNALS
 from ema_model.recordings.formats import FORMATS
 from ema_model.text import COLOURS
 from emaviz.page.compare import WORKSPACE
-from emaviz.page.compare.columns import MappingStep
-from emaviz.page.compare.files import health_card, recordings_list
+from emaviz.page.compare.columns import MappingStep, health_card, recordings_list
 from emaviz.page.compare.result import ResultPanel
-from emaviz.page.correction import COLUMNS, FIT, MISSING
 from emaviz.page.panel import RECORD, REPORT, JobLine, KeepButtons, Lead, Leads
 from emaviz.page.share import Place
 from emaviz.page.style import LONG_LABELS, unseen
-from emaviz.page.tab import Shared, Standing, Tab
+from emaviz.page.tab import COLUMNS, FIT, MISSING, Shared, Standing, Tab
 from emaviz.page.window_layout import COLUMNS as WINDOW_COLUMNS
 from emaviz.page.workspaces import Page
 from emaviz.recording.viewer import ViewerHost
@@ -34,7 +32,7 @@ from emaviz.server.uploads import Uploads
 from emaviz.server.viser_private import id_of
 from emaviz.session.compare import COMPARABLE, LAY_OUT, MAP, OPEN, Comparing
 from emaviz.session.data_folder import ACTUATOR_SUFFIX
-from emaviz.session.discover.discovering import Discovering
+from emaviz.session.discovering import Discovering
 from emaviz.session.files import UPLOADED, Description, Opened, Question
 from emaviz.session.session_file import Part
 from emaviz.session.settings import taken

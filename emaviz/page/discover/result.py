@@ -41,9 +41,9 @@ from emaviz.page.style import IN_PAIRS
 from emaviz.page.window_layout import ALL_COLUMNS, PLOTS_EARLY
 from emaviz.page.workspaces import Page
 from emaviz.scene.playback import motion
-from emaviz.session.discover import source
-from emaviz.session.discover.discovering import Discovering
-from emaviz.session.discover.history import Entry
+from emaviz.session import discovery_source
+from emaviz.session.discovering import Discovering
+from emaviz.session.discovery_history import Entry
 from emaviz.text.html import BOX, Html, add_html, begin, boxed, explained, html, joined, note, waiting
 from emaviz.text.results import folded, large, of_discovery, shown, warned
 
@@ -364,7 +364,7 @@ class DiscoveryPanel:
 
     def _show_truth(self) -> None:
         if self._look is not None:
-            told = source.document_of(self._discovering.source.reveal(), self._look.found, self._look.added)
+            told = discovery_source.document_of(self._discovering.source.reveal(), self._look.found, self._look.added)
             self._truth.content = boxed(joined(map(shown, told.blocks)))
             self._discovering.events.revealed()
 

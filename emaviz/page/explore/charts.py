@@ -17,8 +17,8 @@ from emaviz.figures import runs
 from emaviz.figures.identification import LiveFan
 from emaviz.figures.lines import Window, clipped
 from emaviz.figures.runs import PHASE_SIGNALS, LivePhases, LiveSignals, differences, metrics, run_metrics_table
+from emaviz.page.charts import hint
 from emaviz.page.explore import METRICS, PHASES, WORKSPACE
-from emaviz.page.measure import hint
 from emaviz.page.playback import PlaybackStrip
 from emaviz.page.style import TIME_CHARTS, WIDE_MODAL, play_head
 from emaviz.page.workspaces import Page

@@ -31,9 +31,9 @@ from emaviz.page.panel import JobLine
 from emaviz.page.style import LONG_LABELS
 from emaviz.page.tab import Shared, Tab
 from emaviz.page.workspaces import Page
-from emaviz.session.discover.source import Sealing
+from emaviz.session.discovery_source import Sealing
 from emaviz.session.explore import Simulation
-from emaviz.session.recorded_runs import recovered
+from emaviz.session.files import recovered
 from emaviz.session.settings import MONITORS, Settings, Undo, limits
 from emaviz.text.html import Html, add_html, html, said
 

@@ -25,9 +25,9 @@ from ema_model.effects import CATALOGUE
 from ema_model.errors import InputError
 from ema_model.quantities import in_sentence, number
 from ema_model.result import restored, stored
-from emaviz.session.discover.source import DiscoverySource, Recipe, SavedStory, story_of
-from emaviz.session.inputs import Inputs, Room, digest
+from emaviz.session.discovery_source import DiscoverySource, Recipe, SavedStory, story_of
 from emaviz.session.jobs import Signal, Tell, aside
+from emaviz.session.session_file import Inputs, Room, digest
 
 # --- candidates refitted in the model of a story, each once -----------------------------------------------------------
 # Candidates refitted in the model of a story, each once; and the two between which a test would have to decide.

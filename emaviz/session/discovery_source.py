@@ -36,8 +36,8 @@ from ema_model.text import Document, Lines, Remark, Remarks, Severity
 from emaviz.session.compare import USUAL, Comparing
 from emaviz.session.data_folder import DataFolder, sanitised
 from emaviz.session.explore import Session
-from emaviz.session.inputs import Inputs, digest, listed, version_of
 from emaviz.session.jobs import Job, Signal, Tell
+from emaviz.session.session_file import Inputs, digest, listed, version_of
 from emaviz.session.settings import Settings, taken
 
 # --- what a session's file says of a discovery ------------------------------------------------------------------------

@@ -14,7 +14,7 @@ import pyarrow as pa
 from numpy.typing import NDArray
 
 from ema_model.actuator import Actuator
-from ema_model.campaign.plan_axes import NUMBER, NUMBERS, TEXT, TEXTS, Kind, TaskInputs
+from ema_model.campaign.task import NUMBER, NUMBERS, TEXT, TEXTS, Kind, TaskInputs
 from ema_model.comparison.free_simulation import in_open_loop
 from ema_model.discovery import discover
 from ema_model.errors import InputError, quoted

@@ -19,7 +19,7 @@ import pyarrow as pa
 from ema_model import faults
 from ema_model.actuator import Actuator
 from ema_model.campaign.benchmark import BENCHMARK
-from ema_model.campaign.plan_axes import FLAG, NUMBER, NUMBERS, TEXT, TEXTS, Kind, TaskInputs
+from ema_model.campaign.task import FLAG, NUMBER, NUMBERS, TEXT, TEXTS, Kind, TaskInputs
 from ema_model.comparison import compare
 from ema_model.comparison.compare import weights_of
 from ema_model.comparison.criteria import BAND

@@ -117,7 +117,7 @@ def memory_MB() -> float | None:
 def _answer(task: Any, kind: Any) -> dict[str, Any]:
     import msgspec
 
-    from ema_model.campaign.plan_axes import inputs_of
+    from ema_model.campaign.task import inputs_of
 
     return kind.run(inputs_of(task), msgspec.convert(task.settings, kind.settings), task.seed)
 

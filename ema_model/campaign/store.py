@@ -24,8 +24,7 @@ from msgspec import Meta
 from numpy.typing import NDArray
 
 from ema_model.campaign.kinds import KINDS
-from ema_model.campaign.plan_axes import COMMON, HOW
-from ema_model.campaign.task import Task, from_json, text_hash
+from ema_model.campaign.task import COMMON, HOW, Task, from_json, text_hash
 from ema_model.errors import InputError, quoted
 from ema_model.files.opened import reason, refusal
 from ema_model.files.written import FileLock, remove_abandoned, whole_file
@@ -34,12 +33,7 @@ from ema_model.files.written import FileLock, remove_abandoned, whole_file
 
 _PACKAGE = Path(__file__).parents[1]
 _LIBRARIES = ("numpy", "scipy", "numba", "llvmlite")
-_OF_A_RESULT = (
-    "task.py",
-    "plan_axes.py",
-    "benchmark.py",
-    "kinds.py",
-)  # the rest only moves tasks and rows
+_OF_A_RESULT = ("task.py", "benchmark.py", "kinds.py")  # of this folder; the rest only moves tasks and rows
 
 
 @cache

@@ -1,6 +1,6 @@
 """The commands: each subclass of `Command` in a file of this folder is one, found by its `name`.
 
-To add a command, add a class to `shapes`, or a file.
+To add a command, add a class to `command`, or a file.
 """
 
 from __future__ import annotations

@@ -11,7 +11,7 @@ import pytest
 from ema_model.actuator import load_actuator
 from ema_model.campaign import benchmark
 from ema_model.campaign.benchmark import BENCHMARK, Settings, chosen, followed, needed
-from ema_model.campaign.plan_axes import TaskInputs
+from ema_model.campaign.task import TaskInputs
 from ema_model.errors import InputError
 from ema_model.recordings import Measurement
 

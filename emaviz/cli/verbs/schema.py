@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 import argparse
-import importlib
 import json
 from typing import Any
 
 from ema_model.errors import InputError, did_you_mean, quoted
-from ema_model.members import names
 from emaviz.cli import COMMANDS
 from emaviz.cli.parser import verb_of
 
@@ -43,9 +41,8 @@ def verbs_with_documents() -> dict[str, Any]:
     found = {}
     for name in COMMANDS:
         verb = verb_of(name)
-        if hasattr(verb, "__path__"):
-            inner = {one: importlib.import_module(f"{verb.__name__}.{one}") for one in names(verb.__name__)}
-            found |= {f"{name} {one}": module for one, module in inner.items()}
+        if hasattr(verb, "VERBS"):
+            found |= {f"{name} {inner}": one for inner, one in verb.VERBS.items()}
         else:
             found[name] = verb
     return {name: verb for name, verb in found.items() if hasattr(verb, "documents")}

@@ -20,7 +20,7 @@ from msgspec import Meta
 from ema_model.errors import InputError
 from ema_model.files.written import whole_file
 from emaviz import __version__
-from emaviz.text.time_left import time_left
+from emaviz.text import time_left
 
 # --- what --json of a command holds: the head of all of them, and the results that are a command's own ----------------
 # The others stand beside what makes them, in the `summary` of an analysis. A verb's `documents()` names its own, and

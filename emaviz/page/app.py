@@ -19,7 +19,7 @@ from ema_model.members import classes_in, members
 from ema_model.simulation import plant
 from emaviz.page import compare, explore
 from emaviz.page.charts import Measuring, add_chart_tools, add_measuring
-from emaviz.page.explore.tab import ExploreTab
+from emaviz.page.explore import ExploreTab
 from emaviz.page.panel import JobBar, follow_theme
 from emaviz.page.playback import PlaybackStrip
 from emaviz.page.share import Sharing
@@ -39,17 +39,14 @@ from emaviz.session.discovering import Discovering
 from emaviz.session.explore import Session
 from emaviz.session.jobs import Worker, report
 
-# --- finds the tabs: every file here that states a `WORKSPACE` and defines its tab, or folder whose `tab.py` does -----
+# --- finds the tabs: every file here that states a `WORKSPACE` and defines its tab ------------------------------------
 
 
 def tabs() -> list[type[Tab]]:
     """In their order."""
     found: list[type[Tab]] = []
-    for name in members("emaviz.page", "WORKSPACE", files=True, folders=True):
-        module = importlib.import_module(f"emaviz.page.{name}")
-        if hasattr(module, "__path__"):
-            module = importlib.import_module(f"emaviz.page.{name}.tab")
-        found += classes_in(module, Tab)
+    for name in members("emaviz.page", "WORKSPACE"):
+        found += classes_in(importlib.import_module(f"emaviz.page.{name}"), Tab)
     return sorted(found, key=lambda one: one.workspace.place)
 
 

@@ -30,7 +30,7 @@ from ema_model.recordings import write_measurement
 from ema_model.simulation.plant import FITNESSES
 from emaviz.figures import identification
 from emaviz.figures.identification import LiveConvergence, LiveFit, Row, colour, fault_bars, named, table
-from emaviz.page.explore.tab import ExploreTab, take_separating
+from emaviz.page.explore import ExploreTab, take_separating
 from emaviz.page.panel import RECORD, REPORT, Example, JobLine, recording_link
 from emaviz.page.playback import PlaybackStrip
 from emaviz.page.runs import RunsTab

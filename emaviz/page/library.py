@@ -11,7 +11,7 @@ from ema_model.effects import CATALOGUE, Effect, find
 from ema_model.faults import HEALTHY
 from ema_model.simulation.with_effect import RUNS, WithEffect
 from emaviz.figures.discovery import EffectCharts, picture, small_picture
-from emaviz.page.discover.candidate import about
+from emaviz.page.discover_candidate import about
 from emaviz.page.panel import JobLine
 from emaviz.page.playback import PlaybackStrip
 from emaviz.page.style import LONG_LABELS

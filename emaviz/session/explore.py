@@ -29,7 +29,7 @@ from emaviz.session.identify import Identifying, inputs_of
 from emaviz.session.jobs import Job, Signal, Tell, Worker, report
 from emaviz.session.session_file import Inputs
 from emaviz.session.settings import Settings
-from emaviz.text.time_left import going_on
+from emaviz.text import going_on
 
 # --- a fan ------------------------------------------------------------------------------------------------------------
 # The monitor model's response to one command under five severities of one fault, the other sliders as set.

@@ -1,8 +1,8 @@
-"""Units of one type beside each other: in what they differ, each unit's parameters, whose model suits whom."""
+"""Units of one type beside each other: in what they differ, whose model suits whom, and the physics that they lack."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -11,12 +11,14 @@ from numpy.typing import ArrayLike
 from plotly.subplots import make_subplots
 
 from ema_model.actuator.parameters import on_axes
+from ema_model.fleet.discovery import UnitsDiscovered
+from ema_model.fleet.discovery import headline as headline_of_discovery
 from ema_model.fleet.result import UnitsCompared, headline
 from ema_model.quantities import HALF_90, Quantity, amount, in_sentence, number, of_signal
 from emaviz.colours import LIMIT, REFERENCE
 from emaviz.figures import theme
-from emaviz.text.results import of_units
-from emaviz.views import ANSWER, Figures, Section, View
+from emaviz.text.results import Meaning, of_units
+from emaviz.views import ANSWER, Figures, Piece, Section, View
 
 # --- each unit's parameters with their intervals, beside what the type shares -----------------------------------------
 # Each unit's parameters with their intervals, beside what the type shares: a small chart for each parameter.
@@ -199,7 +201,7 @@ SECTIONS: tuple[Section[UnitsCompared], ...] = (
     ),
 )
 
-VIEW = View(
+UNITS = View(
     of=UnitsCompared,
     name="units",
     title=headline,
@@ -208,3 +210,35 @@ VIEW = View(
     meaning=of_units,
     columns=_columns,
 )
+
+
+# --- the physics that units lack, and beside it what they differ in, as a comparison of the units shows it ------------
+
+
+def _of_compared(one: Section[Any]) -> Section[UnitsDiscovered]:
+    """A comparison's section, of the comparison that is in a discovery."""
+
+    def pieces(result: UnitsDiscovered) -> Iterable[Piece]:
+        return one.pieces(result.compared)
+
+    return Section(one.title, one.anchor, of=pieces)
+
+
+def _lead_of_discovery(result: UnitsDiscovered) -> str:
+    return f"{result.actuator.name}, {len(result.units)} units"
+
+
+def _meaning_of_discovery(result: UnitsDiscovered) -> Meaning:
+    return "found" if result.lacks else "good"
+
+
+UNITS_DISCOVERED = View(
+    of=UnitsDiscovered,
+    name="units_discovery",
+    title=headline_of_discovery,
+    lead=_lead_of_discovery,
+    sections=(ANSWER, *(_of_compared(one) for one in SECTIONS if one != ANSWER)),
+    meaning=_meaning_of_discovery,
+)
+
+VIEW = (UNITS, UNITS_DISCOVERED)

@@ -10,7 +10,7 @@ import pytest
 from support.on_page import wait_until
 
 from ema_model.quantities import with_uncertainty
-from emaviz.page.discover.tab import step
+from emaviz.page.discover import step
 from emaviz.session.files import RecordedRuns, summary
 
 

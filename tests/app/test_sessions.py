@@ -20,9 +20,9 @@ from ema_model.recordings import write_measurement
 from ema_model.simulation.run import Run, simulate_reference
 from emaviz.figures.identification import Row
 from emaviz.page.app import App
-from emaviz.page.compare.tab import Asked
-from emaviz.page.compare.tab import kept as compare_kept
-from emaviz.page.discover.tab import DiscoverTab
+from emaviz.page.compare import Asked
+from emaviz.page.compare import kept as compare_kept
+from emaviz.page.discover import DiscoverTab
 from emaviz.page.identify import IdentifyTab
 from emaviz.page.playback import Looks, PlaybackStrip
 from emaviz.page.runs import RunsTab

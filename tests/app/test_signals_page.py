@@ -16,9 +16,9 @@ from ema_model.recordings.window import reading
 from emaviz.figures import lines, runs
 from emaviz.figures.lines import Lines, clipped
 from emaviz.page.charts import Measuring
-from emaviz.page.compare.result import View, telling_window
-from emaviz.page.compare.tab import CompareTab
-from emaviz.page.explore.tab import ExploreTab
+from emaviz.page.compare import CompareTab
+from emaviz.page.compare_result import View, telling_window
+from emaviz.page.explore import ExploreTab
 from emaviz.server.viser_private import id_of
 
 TIME = np.linspace(0.0, 1.0, 4001)

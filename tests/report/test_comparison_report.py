@@ -17,7 +17,7 @@ from ema_model.comparison.result import Comparison, SignalError, held_out
 from ema_model.comparison.verdict import judge
 from ema_model.errors import InputError
 from ema_model.recordings.health import Finding, Health
-from emaviz.page.compare.result import numbers
+from emaviz.page.compare_result import numbers
 from emaviz.recording.writer import written
 from emaviz.views.comparison import VIEW
 from emaviz.views.export import Figures, export, markup

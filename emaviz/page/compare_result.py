@@ -25,18 +25,20 @@ from emaviz.figures import comparison as comparison_figures
 from emaviz.figures.lines import Lines, Window, clipped
 from emaviz.figures.theme import why_missing
 from emaviz.page.charts import hint, marked
-from emaviz.page.compare import WORKSPACE
-from emaviz.page.compare.columns import MappingStep
+from emaviz.page.compare_columns import MappingStep
 from emaviz.page.panel import Cleared, Example
 from emaviz.page.playback import PlaybackStrip
 from emaviz.page.style import IN_PAIRS
 from emaviz.page.window_layout import ALL_COLUMNS, NEXT_COLUMN, PLOTS_EARLY, ROOM
-from emaviz.page.workspaces import Page
+from emaviz.page.workspaces import Page, Workspace
 from emaviz.scene.playback import Motion, motion
 from emaviz.server.viser_private import selector_of
 from emaviz.session.files import Opened
 from emaviz.text.html import Html, add_html, begin, explained, html, joined, note, unescaped
 from emaviz.text.results import folded, large, of_comparison, shown, warned
+
+WORKSPACE = Workspace("compare", "Compare", viser.Icon.ARROWS_DIFF, 3)
+
 
 # --- a compared recording on the 3D actuator: as measured, the screw glowing where the model fails --------------------
 

@@ -18,10 +18,10 @@ from ema_model.effects import CATALOGUE
 from ema_model.errors import InputError, quoted
 from ema_model.faults import CAUSES
 from ema_model.quantities import number
-from emaviz.page.discover import WORKSPACE, candidate
-from emaviz.page.discover.candidate import OwnEffect
-from emaviz.page.discover.result import HOME, DiscoveryPanel, SideBySide
-from emaviz.page.explore.tab import ExploreTab, take_experiment
+from emaviz.page import discover_candidate
+from emaviz.page.discover_candidate import OwnEffect
+from emaviz.page.discover_result import HOME, WORKSPACE, DiscoveryPanel, SideBySide
+from emaviz.page.explore import ExploreTab, take_experiment
 from emaviz.page.panel import JobLine, KeepButtons, Keeps, Lead, Leads
 from emaviz.page.share import Place
 from emaviz.page.tab import Shared, Standing, Tab
@@ -556,13 +556,13 @@ class DiscoverPanel:
 
     def _open(self, name: str | None) -> None:
         self._opened = name
-        self._style.content = candidate.style(self._look, self._shown(), name)
+        self._style.content = discover_candidate.style(self._look, self._shown(), name)
         self._result.open(name)
         self._guide.show(self._look, name)
 
     def _groups(self) -> list[tuple[Any, list[Any], list[Candidate]]]:
         known = self._look.assessment.candidates if self._look and self._look.assessment else ()
-        worth = self._look.promising[: candidate.MOST] if self._look else []
+        worth = self._look.promising[: discover_candidate.MOST] if self._look else []
         never = [one for one in known if one.obstacle]
         little = [one for one in known if one not in worth and one not in never]
         return [(self._little_folder, self._little, little), (self._never_folder, self._never, never)]
@@ -579,8 +579,8 @@ class DiscoverPanel:
             for i, slot in enumerate(slots):
                 slot.visible = i < len(ones)
                 if i < len(ones) and look is not None:
-                    slot.label = candidate.label(look, ones[i])
-        self._style.content = candidate.style(look, self._shown(), self._opened)
+                    slot.label = discover_candidate.label(look, ones[i])
+        self._style.content = discover_candidate.style(look, self._shown(), self._opened)
 
 
 def _so_far(look: Look) -> str:

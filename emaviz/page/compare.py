@@ -18,9 +18,8 @@ from ema_model.quantities import Axes
 from ema_model.recordings import SIGNALS
 from ema_model.recordings.formats import FORMATS
 from ema_model.text import COLOURS
-from emaviz.page.compare import WORKSPACE
-from emaviz.page.compare.columns import MappingStep, health_card, recordings_list
-from emaviz.page.compare.result import ResultPanel
+from emaviz.page.compare_columns import MappingStep, health_card, recordings_list
+from emaviz.page.compare_result import WORKSPACE, ResultPanel
 from emaviz.page.panel import RECORD, REPORT, JobLine, KeepButtons, Lead, Leads
 from emaviz.page.share import Place
 from emaviz.page.style import LONG_LABELS, unseen

@@ -33,19 +33,21 @@ from ema_model.quantities import in_sentence, number
 from ema_model.recordings import SIGNALS, Measurement
 from emaviz.figures import discovery
 from emaviz.figures.discovery import equation
-from emaviz.page.discover import WORKSPACE
-from emaviz.page.discover.candidate import CARDS, CONFIG, Cards, EffectView
+from emaviz.page.discover_candidate import CARDS, CONFIG, Cards, EffectView
 from emaviz.page.panel import Example, KeepButtons, Keeps
 from emaviz.page.playback import PlaybackStrip
 from emaviz.page.style import IN_PAIRS
 from emaviz.page.window_layout import ALL_COLUMNS, PLOTS_EARLY
-from emaviz.page.workspaces import Page
+from emaviz.page.workspaces import Page, Workspace
 from emaviz.scene.playback import motion
 from emaviz.session import discovery_source
 from emaviz.session.discovering import Discovering
 from emaviz.session.discovery_history import Entry
 from emaviz.text.html import BOX, Html, add_html, begin, boxed, explained, html, joined, note, waiting
 from emaviz.text.results import folded, large, of_discovery, shown, warned
+
+WORKSPACE = Workspace("discover", "Discover", viser.Icon.BULB, 4, lower=True)
+
 
 # --- suggested next test: the command and load that tell rivals apart; into Explore, or as CSV for a rig --------------
 

@@ -18,16 +18,21 @@ from emaviz.figures.identification import LiveFan
 from emaviz.figures.lines import Window, clipped
 from emaviz.figures.runs import PHASE_SIGNALS, LivePhases, LiveSignals, differences, metrics, run_metrics_table
 from emaviz.page.charts import hint
-from emaviz.page.explore import METRICS, PHASES, WORKSPACE
 from emaviz.page.playback import PlaybackStrip
 from emaviz.page.style import TIME_CHARTS, WIDE_MODAL, play_head
-from emaviz.page.workspaces import Page
+from emaviz.page.workspaces import Page, Workspace
 from emaviz.scene.playback import FIRST
 from emaviz.server.safe_server import SCENES
 from emaviz.session.data_folder import DataFolder
 from emaviz.session.explore import Fan, Simulation
 from emaviz.session.jobs import Worker
 from emaviz.text.html import add_html, html, said
+
+PHASES, METRICS = "Phases", "Metrics"
+WORKSPACE = Workspace(
+    "explore", "Explore", viser.Icon.ADJUSTMENTS, 1, share=0.4, inset=False, waiting=(PHASES, METRICS)
+)
+
 
 # --- explore's tabs on the right: the signals, the phases, the run in numbers, and what can be taken away -------------
 

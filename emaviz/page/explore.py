@@ -25,8 +25,7 @@ from ema_model.quantities import USER, labelled, of_signal
 from ema_model.simulation import plant
 from ema_model.simulation.run import SHAPES
 from ema_model.text import COLOURS
-from emaviz.page.explore import WORKSPACE
-from emaviz.page.explore.charts import ChartsPanel, ExportControls
+from emaviz.page.explore_charts import WORKSPACE, ChartsPanel, ExportControls
 from emaviz.page.panel import JobLine
 from emaviz.page.style import LONG_LABELS
 from emaviz.page.tab import Shared, Tab

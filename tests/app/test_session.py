@@ -106,7 +106,7 @@ def test_a_diverging_model_is_told_and_the_session_goes_on(session, monkeypatch)
         raise FloatingPointError("the reference model diverged")
 
     with monkeypatch.context() as patch:
-        patch.setattr("ema_model.simulation.run.simulate_reference", diverge)
+        patch.setattr("ema_model.simulation.plant.simulate_reference", diverge)
         session.refresh()
         assert told.wait(10.0)
     session.events.simulated.connect(lambda _: drawn.set())

@@ -11,8 +11,7 @@ from typing import BinaryIO
 
 import pyarrow as pa
 
-from ema_model.recordings.formats.channels import Log, NoLog, broken_file
-from ema_model.recordings.formats.logs import log_format
+from ema_model.recordings.formats.channels import Log, NoLog, broken_file, log_format
 
 # --- whether an MCAP file's chunks unpack to what they declare, by the specification (mcap.dev/spec) ------------------
 # Rerun's reader never ends on some chunks that do not; so each is unpacked here first, and its checksum compared.

@@ -10,9 +10,8 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.compute
 
-from ema_model.recordings.formats.channels import Channel, Log, NoLog, broken_file
+from ema_model.recordings.formats.channels import Channel, Log, NoLog, broken_file, log_format
 from ema_model.recordings.formats.json import decoded, numbers_of_records
-from ema_model.recordings.formats.logs import log_format
 
 # --- Rerun's chunks as channels: each entity's numbers, on its timeline, whatever message they came from --------------
 

@@ -10,8 +10,7 @@ from urllib.parse import quote
 import plotly.graph_objects as go
 import viser
 
-from ema_model.campaign.result import Campaign
-from ema_model.campaign.store import Store, summaries
+from ema_model.campaign.store import Campaign, Store, summaries
 from ema_model.discovery.result import effect_title
 from ema_model.errors import InputError
 from ema_model.quantities import NOTHING, explanation_title

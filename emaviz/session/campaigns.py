@@ -16,9 +16,8 @@ import msgspec
 from ema_model.actuator import load_actuator
 from ema_model.campaign.kinds import KINDS
 from ema_model.campaign.plan import Plan, load_plan, shipped_plans
-from ema_model.campaign.result import Campaign
 from ema_model.campaign.run import Status, duration, estimate_s, run_plan, scheduler
-from ema_model.campaign.store import Packed, Store
+from ema_model.campaign.store import Campaign, Packed, Store
 from ema_model.campaign.task import Task, TaskInputs, inputs_of
 from ema_model.comparison import compare
 from ema_model.discovery import discover

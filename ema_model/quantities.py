@@ -97,8 +97,6 @@ def linear_name(name: str) -> str:
     return f"{words}_{BY_SHOWN[unit.linear].ending}"
 
 
-# --- numbers as they are written: rounding, intervals, units' prefixes ------------------------------------------------
-
 # --- intervals as they are told: each holds 90 % ----------------------------------------------------------------------
 
 HALF_90 = 1.645  # σ of a normal distribution, on either side

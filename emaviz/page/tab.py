@@ -342,7 +342,7 @@ class Shared:
 
 
 class Tab(ABC):
-    """One workspace of the page, found by its folder, whose `tab.py` defines it."""
+    """One workspace of the page, found by its file."""
 
     workspace: ClassVar[Workspace]
 

@@ -395,7 +395,7 @@ def _samples(column: Channel | str, log: Log) -> int:
 def taken(
     path: str, log: Log, names: Sequence[str], max_bytes: int, strict: bool
 ) -> tuple[dict[str, Array], list[str], Clocks | None]:
-    """The columns asked for with one length, by the rule of `clocks`: the clock with the most samples is that of all.
+    """The columns asked for with one length, by the rule of `format`: the clock with the most samples is that of all.
 
     With it what was done, in words and by column; strict: only where all were recorded.  Raises InputError for what
     takes more than `max_bytes` and for channels that have no time in common, NoLog for what is no column of numbers.

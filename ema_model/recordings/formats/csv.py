@@ -354,7 +354,7 @@ def on_one_clock(
     found: Mapping[int, Array | None],
     strict: bool,
 ) -> tuple[dict[str, Array], list[str], Clocks | None]:
-    """The columns on the time with the most samples, see `clocks`; what was done, in words and by column.
+    """The columns on the time with the most samples, see `format`; what was done, in words and by column.
 
     titles: of the file's columns; clocks: by column, that of its time; places: a name's column; found: numbers by
     column, each as long as it goes; strict: only where all were recorded.

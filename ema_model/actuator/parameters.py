@@ -111,7 +111,7 @@ def _of(facts: Facts, sits: Sits, default: Any = MISSING) -> Any:
 class Controller:
     """Control electronics.
 
-    cascade: position and PID speed loop (T 3.2.3; `ema_model.physics.electronics`).  With a hysteresis inverter it is
+    cascade: position and PID speed loop (T 3.2.3; `ema_model.physics.equations`).  With a hysteresis inverter it is
     the thesis's, whose integral is held at standstill.  position: a position loop alone, whose output is a share of
     what the drive can give.  unknown: recordings are held against inverse dynamics.
     """

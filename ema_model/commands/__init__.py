@@ -9,8 +9,7 @@ from collections.abc import Mapping
 from dataclasses import fields
 from typing import Any
 
-from ema_model.commands.command import Command
-from ema_model.commands.recorded import Recorded
+from ema_model.commands.command import Command, Recorded
 from ema_model.errors import InputError, did_you_mean, quoted
 from ema_model.members import classes
 

@@ -12,7 +12,7 @@ from typing import TypeVar, overload
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ema_model.commands import recorded
+from ema_model.commands.command import between as samples_between
 from ema_model.errors import InputError
 from ema_model.files.opened import listed, refusal, shown
 from ema_model.quantities import MOTOR, SIGNALS, USER, Axes, check_number, check_seed, number
@@ -384,7 +384,7 @@ class Measurement(InWords):
         for name, values in self.signals.items():
             state = name in SIGNALS and SIGNALS[name].kind == "state"
             if name == "command_rad":  # it is known exactly, and a chord would leave it where it bends
-                resampled[name] = recorded.between(grid, time, values[run])
+                resampled[name] = samples_between(grid, time, values[run])
             elif name in SIGNALS and SIGNALS[name].kind == "position" and time.size > _OF_A_CURVE:
                 resampled[name] = _curved(grid, time, values[run])
             else:

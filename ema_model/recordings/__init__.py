@@ -3,8 +3,14 @@
 from __future__ import annotations
 
 from ema_model.quantities import SIGNALS, Signal
-from ema_model.recordings.column_guess import guess_mapping
-from ema_model.recordings.column_mapping import ColumnMapping, MappedColumn, Reading, apply_mapping, parse_mapping
+from ema_model.recordings.column_mapping import (
+    ColumnMapping,
+    MappedColumn,
+    Reading,
+    apply_mapping,
+    guess_mapping,
+    parse_mapping,
+)
 from ema_model.recordings.measurement import Measurement, can_have_current, with_equivalent_current
 from ema_model.recordings.read import (
     check_needed,

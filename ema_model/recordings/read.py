@@ -21,12 +21,13 @@ from ema_model.errors import InputError, did_you_mean, quoted
 from ema_model.files.opened import COLUMNS, FILE_BYTES, RUNS, check_user_file, listed, megabytes, reason, refusal, shown
 from ema_model.files.written import whole_file
 from ema_model.quantities import SIGNALS, lookalikes, looks_like_time
-from ema_model.recordings.column_guess import doubt, guess_mapping
 from ema_model.recordings.column_mapping import (
     ColumnMapping,
     MappedColumn,
     Reading,
     apply_mapping,
+    doubt,
+    guess_mapping,
     parse_mapping,
     unit_in_name,
     with_places,

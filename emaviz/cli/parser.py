@@ -58,9 +58,9 @@ class AnalysisVerb:
 
     def run(self, arguments: argparse.Namespace) -> int:
         """Reads, analyses, writes and prints."""
-        from emaviz.cli import flow, option_values
+        from emaviz.cli import flow
 
-        actuator = option_values.actuator_of(arguments)
+        actuator = flow.actuator_of(arguments)
         chosen = {name: getattr(arguments, name) for name in self._analysis.options}
 
         def compute(recordings: list[Measurement], _: list[Measurement], progress: output.Progress) -> flow.Answer:

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from ema_model.errors import InputError
 from ema_model.recordings import SIGNALS, ColumnMapping, MappedColumn, apply_mapping, guess_mapping, parse_mapping
-from ema_model.recordings.column_guess import doubt
+from ema_model.recordings.column_mapping import doubt
 from ema_model.recordings.read import read_measurement
 from ema_model.recordings.units import UNITS, find_unit
 

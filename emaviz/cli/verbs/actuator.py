@@ -236,11 +236,11 @@ def _effect(text: str) -> tuple[str, dict[str, Any]]:
     """The table of --effect NAME:param=value±tolerance,…"""
     from ema_model.actuator.describe import entry_of, number_of
     from ema_model.effects.user.torque import kind_of
-    from emaviz.cli import option_values
+    from emaviz.cli import flow
 
     name, _, rest = text.partition(":")
     table: dict[str, Any] = {}
-    for part in option_values.split_at_commas(rest):
+    for part in flow.split_at_commas(rest):
         key, separator, value = (piece.strip() for piece in part.partition("="))
         where = f"--effect {quoted(name)}: {quoted(key)}"
         if not separator:
@@ -250,7 +250,7 @@ def _effect(text: str) -> tuple[str, dict[str, Any]]:
         if kind_of(name) and key in _TEXTS:
             table[key] = value
         elif kind_of(name) and key == "values":
-            table[key] = [entry_of(one, where) for one in option_values.split_at_commas(value.strip("[]"))]
+            table[key] = [entry_of(one, where) for one in flow.split_at_commas(value.strip("[]"))]
         else:
             table[key] = (number_of if kind_of(name) == "torque_curve" else entry_of)(value, where)
     return name, table
@@ -258,7 +258,7 @@ def _effect(text: str) -> tuple[str, dict[str, Any]]:
 
 def _rule(text: str) -> dict[str, Any]:
     from ema_model.actuator.describe import number_of
-    from emaviz.cli import option_values
+    from emaviz.cli import flow
 
     pattern, separator, rest = text.partition(":")
     if not separator or not rest:
@@ -266,7 +266,7 @@ def _rule(text: str) -> dict[str, Any]:
     if rest in ("map", "run"):
         return {"match": pattern, "kind": rest}
     values = {}
-    for part in option_values.split_at_commas(rest):
+    for part in flow.split_at_commas(rest):
         path, _, value = part.partition("=")
         values[path.strip()] = number_of(value, f"--where {quoted(path)}")
     return {"match": pattern, "set": values}
@@ -384,11 +384,11 @@ def _beside(actuator: Actuator, arguments: argparse.Namespace) -> dict[str, list
     """What the recording and a calibration by it say."""
     from ema_model.actuator.actuator import usual_filter
     from ema_model.actuator.parameters import on_axes
-    from emaviz.cli import option_values, output
+    from emaviz.cli import flow, output
 
     progress = output.Progress(arguments)
     try:
-        recording = option_values.read_one(arguments.recording, arguments, actuator, progress)
+        recording = flow.read_one(arguments.recording, arguments, actuator, progress)
         from ema_model.comparison import compare  # takes a second: recordings are refused before
 
         result = compare([recording], actuator, on_progress=progress.show)

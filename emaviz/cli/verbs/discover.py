@@ -42,14 +42,12 @@ def documents() -> tuple[type, ...]:
 
 def run(arguments: argparse.Namespace) -> int:
     """Discovers, and of units what they lack; once interrupted, what was found so far."""
-    from emaviz.cli import flow, option_values
+    from emaviz.cli import flow
 
-    actuator = option_values.actuator_of(arguments)
+    actuator = flow.actuator_of(arguments)
     signals = _CURRENT_ONLY if arguments.signals == "current" else None
     if arguments.by or arguments.unit:
-        from emaviz.cli.flow import run_discovery
-
-        return run_discovery(arguments, actuator, signals)
+        return flow.run_discovery(arguments, actuator, signals)
 
     def compute(fitted: list[Measurement], held: list[Measurement], progress: output.Progress) -> flow.Answer:
         # These take a second: recordings are refused before.

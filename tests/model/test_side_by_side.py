@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from numba.core import config
 
-from ema_model import stacks
+from ema_model import side_by_side
 from ema_model.side_by_side import blocks, fits, windows
 
 
@@ -56,7 +56,7 @@ def test_what_numpy_ignores_is_ignored_in_threads_too(threads):
 
 
 def test_a_single_one_needs_no_thread(monkeypatch):
-    monkeypatch.setattr(stacks, "_pool", None)
+    monkeypatch.setattr(side_by_side, "_pool", None)
     names = windows(lambda place: threading.current_thread().name, range(1))
     assert names == [threading.current_thread().name]
 

@@ -31,7 +31,7 @@ from ema_model.discovery.begin import with_fitted_effects
 from ema_model.effects import find
 from ema_model.errors import InputError, did_you_mean, quoted
 from ema_model.exports import export as exporting
-from ema_model.exports.result import Export
+from ema_model.exports.replay import Export
 from ema_model.faults import vector
 from ema_model.fleet.compare import compare_units as compared_units
 from ema_model.fleet.result import UnitsCompared
@@ -47,7 +47,7 @@ from ema_model.simulation import plant
 from ema_model.simulation.run import Run
 from ema_model.tracking import track as tracking
 from ema_model.tracking.flights import check_enough, check_order, flights_in, identified
-from ema_model.tracking.result import Tracked
+from ema_model.tracking.track import Tracked
 
 __all__ = [
     "InputError",

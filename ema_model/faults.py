@@ -10,8 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ema_model.errors import InputError, did_you_mean, quoted
-from ema_model.quantities.numbers import check_number
-from ema_model.quantities.titles import in_sentence
+from ema_model.quantities import check_number, in_sentence
 
 _LEAST_TURNS = 0.02  # less, and the three-phase model diverges when two phases are shorted
 

@@ -1,6 +1,6 @@
-"""Finds the members of a family: each file or folder of a package is one, and states its own facts.
+"""Finds the members of a family: each file of a package is one, and states its own facts.
 
-Effects, commands, formats, optimisers, kinds of campaigns, verbs and tabs are found so; adding one is adding a file.
+Effects, commands, formats, optimisers, verbs and tabs are found so; adding one is adding a file.
 """
 
 from __future__ import annotations
@@ -17,10 +17,9 @@ from typing import Any, TypeVar
 Base = TypeVar("Base")
 
 
-def names(package: str, *, files: bool = True, folders: bool = True) -> list[str]:
-    """The files and folders of a package, in alphabetical order; neither they nor the package are imported."""
-    found = pkgutil.iter_modules(map(str, _places(package)))
-    return sorted(one.name for one in found if (folders if one.ispkg else files))
+def names(package: str) -> list[str]:
+    """The files of a package, in alphabetical order; neither they nor the package are imported."""
+    return sorted(one.name for one in pkgutil.iter_modules(map(str, _places(package))) if not one.ispkg)
 
 
 def stated(package: str, fact: str) -> dict[str, Any]:
@@ -34,6 +33,18 @@ def stated(package: str, fact: str) -> dict[str, Any]:
         if fact in (source := _source(path)) and (values := list(_assigned(_parsed(source), fact))):
             found[path.stem] = values[0]
     return found
+
+
+def stated_by_class(package: str, fact: str) -> dict[str, Any]:
+    """The literals that the classes of a package's files assign to this name, by the classes' names."""
+    return {
+        node.name: value
+        for place in _places(package)
+        for path in sorted(place.glob("[!_]*.py"))
+        for node in _parsed(_source(path)).body
+        if isinstance(node, ast.ClassDef)
+        for value in _assigned(node, fact)
+    }
 
 
 def stated_in(module: str, fact: str) -> Any:
@@ -71,16 +82,15 @@ def _assigned(body: ast.Module | ast.ClassDef, fact: str) -> Iterator[Any]:
                     yield ...
 
 
-def members(package: str, fact: str, *, files: bool = True, folders: bool = False) -> dict[str, Any]:
-    """What the files or folders of a package state under this name, by theirs; those without it are no members."""
-    wanted = names(package, files=files, folders=folders)
-    modules = {name: importlib.import_module(f"{package}.{name}") for name in wanted}
+def members(package: str, fact: str) -> dict[str, Any]:
+    """What the files of a package state under this name, by theirs; those without it are no members."""
+    modules = {name: importlib.import_module(f"{package}.{name}") for name in names(package)}
     return {name: getattr(module, fact) for name, module in modules.items() if hasattr(module, fact)}
 
 
 def classes(package: str, base: type[Base]) -> list[type[Base]]:
     """The concrete classes of a kind that the files of a package define."""
-    modules = [importlib.import_module(f"{package}.{name}") for name in names(package, folders=False)]
+    modules = [importlib.import_module(f"{package}.{name}") for name in names(package)]
     return [one for module in modules for one in classes_in(module, base)]
 
 

@@ -36,7 +36,7 @@ from msgspec import Meta
 
 from ema_model.errors import InputError, quoted
 from ema_model.files.written import write_text
-from ema_model.quantities.numbers import plain
+from ema_model.quantities import plain
 from ema_model.text import InWords, Lines
 
 Kind = TypeVar("Kind")

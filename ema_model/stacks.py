@@ -137,8 +137,8 @@ def _composition(circuit: str, controller: str, effects: Sequence[Any]) -> str:
     imports = [
         '"""Generated: the places where this stack\'s effects act."""',
         "from ema_model.physics.jit import passed_on, scalar",
-        f"from ema_model.physics.controller import {controller}_controller as control",
-        f"from ema_model.physics.drive import {circuit}_drive as advance_current",
+        f"from ema_model.physics.equations import {controller}_controller as control",
+        f"from ema_model.physics.equations import {circuit}_drive as advance_current",
     ]
     bodies: dict[str, list[str]] = {place: [] for place in PLACES}
     advances: list[str] = []

@@ -48,7 +48,6 @@ FLOORS = {
         ["colours", "text"],
         ["recording"],
         ["figures", "formats"],
-        ["report"],
         ["views"],
         ["session"],
         ["server"],

@@ -39,13 +39,10 @@ from ema_model.discovery.result import Change, errors_of
 from ema_model.discovery.snapshot import Look, assessed, look_at
 from ema_model.estimation.calibrate import calibration_table, combination_in_words
 from ema_model.faults import NAMES
-from ema_model.identification.run import Identification, identify
+from ema_model.identification.run import Identification, identify, in_one_line
+from ema_model.identification.run import verdict as identified_verdict
 from ema_model.identification.search import Objective
-from ema_model.identification.words import in_one_line
-from ema_model.identification.words import verdict as identified_verdict
-from ema_model.quantities.axes import of_signal
-from ema_model.quantities.numbers import amount, number
-from ema_model.quantities.variables import variable_title
+from ema_model.quantities import amount, number, of_signal, variable_title
 from ema_model.recordings import Measurement
 from ema_model.recordings.read import read_measurement
 from ema_model.text import COLOURS
@@ -54,9 +51,9 @@ from emaviz.figures import campaign
 from emaviz.figures import comparison as comparison_figures
 from emaviz.figures import discovery as discovery_figures
 from emaviz.figures.identification import fault_bars
-from emaviz.page.compare.result import headline, motion_of, numbers
-from emaviz.page.discover import candidate
-from emaviz.page.discover.result import answer
+from emaviz.page import discover_candidate
+from emaviz.page.compare_result import headline, motion_of, numbers
+from emaviz.page.discover_result import answer
 from emaviz.text.results import MEANINGS, of_comparison, of_discovery, sure_words
 from emaviz.views.export import export
 
@@ -232,7 +229,7 @@ def test_shares_are_those_of_the_residual_as_it_is(case):
 
 
 def _modulators(figure: Any) -> list[str]:
-    from ema_model.quantities.variables import MODULATORS
+    from ema_model.quantities import MODULATORS
 
     return [next(name for name, one in MODULATORS.items() if one.title == bar.name) for bar in figure.data]
 
@@ -368,12 +365,12 @@ def test_cards_stand_in_the_order_of_their_bars():
     look = looked_at()
     probable = [look.probability(one) for one in look.promising]
     assert probable and probable == sorted(probable, reverse=True) and max(probable) <= 1.0
-    style = candidate.style(look, [(f"card {i}", one) for i, one in enumerate(look.promising)], None)
+    style = discover_candidate.style(look, [(f"card {i}", one) for i, one in enumerate(look.promising)], None)
     bars = [float(one) for one in re.findall(r"linear-gradient\(to right,[^ ]+ ([\d.]+)%", style)]
     assert bars == [pytest.approx(100.0 * one, abs=0.05) for one in probable]
     for one, share in zip(look.promising, probable):
-        text, head = candidate.label(look, one), plain(candidate.head(look, one))
-        assert f"{words.in_percent(share)} probable" in text and candidate.confidence(look, one) in head
+        text, head = discover_candidate.label(look, one), plain(discover_candidate.head(look, one))
+        assert f"{words.in_percent(share)} probable" in text and discover_candidate.confidence(look, one) in head
         assert not unstated(text + head, [look.rmse, look.predicted_rmse(one)])
 
 

@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 from ema_model.actuator.actuator import Actuator
-from ema_model.actuator.file import actuator_text, load_actuator, parse_actuator, shipped
+from ema_model.actuator.file import actuator_text, load_actuator, parse_actuator, save_actuator, shipped
 from ema_model.actuator.parameters import Rule, Tolerance, paths
-from ema_model.actuator.write import save_actuator
 
 __all__ = [
     "Actuator",

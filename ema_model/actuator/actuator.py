@@ -31,9 +31,7 @@ from ema_model.actuator.parameters import (
 )
 from ema_model.errors import InputError, quoted
 from ema_model.faults import physical, vector
-from ema_model.quantities.axes import Axes
-from ema_model.quantities.numbers import Quantity, with_uncertainty
-from ema_model.quantities.sides import USER
+from ema_model.quantities import USER, Axes, Quantity, with_uncertainty
 
 # --- one actuator: its parameters with their tolerances, its effects and its known faults -----------------------------
 
@@ -46,7 +44,7 @@ _FITTED = "The sigma of each fitted parameter is 1 σ of what the fit found; its
 
 @dataclass(frozen=True)
 class Actuator:
-    """All parameters of one actuator; SI units, which the names say (for linear axes see `quantities.axes`).
+    """All parameters of one actuator; SI units, which the names say (for linear axes see `quantities`).
 
     Its faults are the known state of this unit: what simulates it (a run, a comparison, a discovery) starts from
     them unless it is told another k.  An identification does not: its k counts from the healthy actuator, so that a

@@ -22,8 +22,7 @@ from ema_model.actuator.parameters import (
     unread,
 )
 from ema_model.errors import InputError, quoted
-from ema_model.quantities.axes import Axes
-from ema_model.quantities.numbers import number
+from ema_model.quantities import Axes, number
 
 # --- what an actuator's file lacks, and what in it is hard to believe, told without a recording -----------------------
 

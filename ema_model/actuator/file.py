@@ -1,37 +1,48 @@
-"""Reads an actuator from its TOML file; a mistake in it, or what no model reads, gives one line that says where."""
+"""Reads an actuator from its TOML file and writes one that is read back; a mistake in it gives one line."""
 
 from __future__ import annotations
 
 import math
+import os
+import re
+from collections.abc import Mapping
 from dataclasses import fields, replace
 from pathlib import Path
 from typing import Any
 
+import tomlkit
+
 from ema_model.actuator.actuator import LONGEST_S, SHORTEST_S, Actuator, reader_step
-from ema_model.actuator.keys import ENTRY, HEAD, TABLES
 from ema_model.actuator.parameters import (
+    CHOICES,
+    ENTRY,
+    HEAD,
     INVERSE,
     KINDS,
     SECTIONS,
+    TABLES,
     USUAL,
     Rule,
     Tolerance,
     check_stops,
     check_value,
     check_value_is_read,
+    default_of,
+    facts_of,
     idle,
     layout,
+    numbers,
     on_axes,
     settings_read,
     unread,
 )
+from ema_model.actuator.reference import as_spelt, tables_of
 from ema_model.errors import InputError, did_you_mean, quoted
 from ema_model.faults import vector
 from ema_model.files.opened import TEXT_BYTES, open_user_file, shipped_folder
-from ema_model.files.written import toml_of
-from ema_model.quantities.axes import KINDS as AXIS_KINDS
-from ema_model.quantities.axes import Axes
-from ema_model.quantities.numbers import as_number
+from ema_model.files.written import change_file, inline, toml_of, toml_text
+from ema_model.quantities import KINDS as AXIS_KINDS
+from ema_model.quantities import Axes, as_number
 
 # --- whether all that an actuator's file says is read by a model of its kind ------------------------------------------
 
@@ -177,7 +188,8 @@ def actuator_of(document: dict[str, Any], where: str) -> Actuator:
     tables = {name: _table(document, name, where) for name in (*SECTIONS, *_OTHERS[3:])}
     axes = _axes(tables["axes"], where)
     kinds = {
-        section: _choice(tables[section], "kind", USUAL[section], KINDS[section], section, where) for section in KINDS
+        section: _choice(tables[section], "kind", USUAL[section], CHOICES[section], section, where)
+        for section in CHOICES
     }
     is_voltage = kinds["inverter"] == "voltage"
     if kinds["controller"] == "unknown" or (kinds["controller"] == "open" and not is_voltage):
@@ -215,12 +227,12 @@ def _section(
     inside = {on_axes(f"{section}.{name}", axes).name: name for name in (*needed, *optional)}
     reasons = unread(kinds["controller"], kinds["inverter"])
     why = {on_axes(path, axes).name: reason for path, reason in reasons.items() if path.startswith(section)}
-    for extra in set(given) - set(inside) - ({"kind"} if section in KINDS else set()):
+    for extra in set(given) - set(inside) - ({"kind"} if section in CHOICES else set()):
         reason = f": {why[extra]}" if extra in why else ""
         raise InputError(
             f"{where}: [{section}] has no parameter {quoted(extra)!r}{reason}; it has {', '.join(inside) or 'none'}"
         )
-    values: dict[str, Any] = {"kind": kinds[section]} if section in KINDS else {}
+    values: dict[str, Any] = {"kind": kinds[section]} if section in CHOICES else {}
     for shown, name in inside.items():
         if shown in given:
             values[name], tolerance = _entry(section, name, shown, given[shown], where)
@@ -238,7 +250,7 @@ def _effects(
     if not given:  # the catalogue's kernels need not be loaded for an actuator without effects
         return {}
     from ema_model.effects import find
-    from ema_model.effects.user.entries import kind_of, read_entries
+    from ema_model.effects.user.torque import kind_of, read_entries
 
     effects: dict[str, dict[str, float]] = {}
     for given_name in given:
@@ -383,3 +395,121 @@ def _rules(table: dict[str, Any], axes: Axes, where: str) -> tuple[Rule, ...]:
             values[f"{section}.{inside[shown]}"] = float(value)
         rules.append(Rule(rule["match"], values, kind))
     return tuple(rules)
+
+
+# --- writes an actuator to a TOML file that `load_actuator` reads back; what somebody noted in its file stays ---------
+
+_COMMENTS_AT = 64  # characters from the left
+_HEAD = re.compile(r"\[\s*([\w.-]+)\s*\]\s*(?:#.*)?")
+_OFFER = re.compile(r"#\s*(\w+)\s*=\s*(-?\d+(?:\.\d*)?(?:e[-+]?\d+)?)\s*(?:#.*)?")  # an entry that is a comment
+
+
+def save_actuator(actuator: Actuator, path: str | os.PathLike[str], *, with_comments: bool = False) -> None:
+    """Writes all parameters, tolerances, effects and faults, whole or not at all.
+
+    Comments, order and spelling stay those of the file that is replaced, or else of the file that it was read from.
+    with_comments: what each key means, instead.  Raises InputError if the file cannot be written.
+    """
+    target = Path(path)
+    if target.suffix != ".toml":
+        raise InputError(f"{quoted(target)}: the name of an actuator file must end in .toml")
+    try:
+        change_file(target, lambda text: commented(actuator) if with_comments else _over(text, actuator), TEXT_BYTES)
+    except OSError as error:
+        raise InputError(f"{quoted(target)}: cannot be written ({error.strerror}); check the folder") from None
+
+
+def as_toml(actuator: Actuator) -> str:
+    """The file's text, with the comments of the file that it was read from."""
+    return _over("", actuator)
+
+
+def _over(text: str, actuator: Actuator) -> str:
+    text = text or actuator.text
+    try:
+        known = toml_of(text)
+    except ValueError:  # what is to be replaced is none
+        known, text = {}, actuator.text
+    tables = as_spelt(tables_of(actuator), known)
+    said = known.get("model")
+    for name in TABLES["model"]:  # one that says nothing may stand
+        if isinstance(said, Mapping) and said.get(name) == getattr(actuator, name):
+            tables["model"][name] = said[name]
+    lines = _with_each_key_once(text.split("\n"), known, tables, actuator)
+    if actuator.note and (note := f"# {actuator.note}") not in lines:
+        lines = [note, *([] if lines[0].startswith("#") else [""]), *lines]
+    return toml_text(tables, "\n".join(lines))
+
+
+def _with_each_key_once(
+    lines: list[str], known: Mapping[str, Any], tables: dict[str, Any], actuator: Actuator
+) -> list[str]:
+    """Lines in which no parameter stands both as an entry and as the comment that offers it at its default.
+
+    A comment whose parameter now has another value or a tolerance becomes the entry; else the comment is enough, and
+    tables, what is to be written, lose the entry.
+    """
+    kept, section, inside = [], "", {}
+    for line in lines:
+        if head := _HEAD.fullmatch(line.rstrip()):
+            section = head[1]
+            names = numbers(section) if section in SECTIONS else ()
+            inside = {on_axes(path, actuator.axes).name: path for path in (f"{section}.{name}" for name in names)}
+        offer = _OFFER.fullmatch(line.rstrip())
+        path = inside.get(offer[1]) if offer else None
+        if offer is None or path is None or float(offer[2]) != default_of(path):
+            kept.append(line)
+        elif offer[1] in known.get(section, {}) or offer[1] not in tables[section]:
+            kept += [] if offer[1] in tables[section] else [line]
+        elif _is_idle(actuator, path):
+            del tables[section][offer[1]]
+            kept.append(line)
+        else:
+            kept.append(line.lstrip("# "))
+            del inside[offer[1]]
+    return kept
+
+
+def commented(actuator: Actuator) -> str:
+    """The file's text with what each key means; what stands at its default is there to be taken, as a comment."""
+    whole = tomlkit.document()
+    for line in (
+        "Each parameter is a number, or a table:",
+        *(f"  {key:10} {told}" for key, told in ENTRY.items()),
+    ):
+        whole.add(tomlkit.comment(line))
+    whole.add(tomlkit.nl())
+    for name, entry in tables_of(actuator).items():
+        whole.add(name, _with_meanings(actuator, name, entry) if name in ("axes", "model", *SECTIONS) else entry)
+    return tomlkit.dumps(whole)
+
+
+def _with_meanings(actuator: Actuator, name: str, entries: dict[str, Any]) -> Any:
+    kinds = {"controller": actuator.controller.kind, "inverter": actuator.inverter.kind}
+    needed, optional = layout(name, kinds) if name in SECTIONS else ((), ())
+    paths = {on_axes(f"{name}.{one}", actuator.axes).name: f"{name}.{one}" for one in (*needed, *optional)}
+    meanings = TABLES.get(name, {}) | {key: about(path, actuator.axes) for key, path in paths.items()}
+    if name in KINDS:
+        meanings["kind"] = KINDS[name][kinds[name]]
+    idle = [key for key, path in paths.items() if path.partition(".")[2] in optional and _is_idle(actuator, path)]
+    table = tomlkit.table()
+    for key, value in entries.items():
+        item = inline(value)
+        line = f"{key} = {item.as_string()}"
+        if key in idle:
+            table.add(tomlkit.comment(f"{line:{_COMMENTS_AT - 2}}  # {meanings[key]}"))
+            continue
+        item.comment(meanings[key])
+        item.trivia.comment_ws = " " * (max(_COMMENTS_AT - len(line), 0) + 2)
+        table.add(key, item)
+    return table
+
+
+def _is_idle(actuator: Actuator, path: str) -> bool:
+    return path not in actuator.tolerances and actuator.value(path) == default_of(path)
+
+
+def about(path: str, axes: Axes) -> str:
+    """'of all that moves, as the motor feels it [kg·m²]': what "section.parameter" means."""
+    unit = on_axes(path, axes).unit
+    return facts_of(path, axes).meaning + (f" [{unit}]" if unit else "")

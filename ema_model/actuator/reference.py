@@ -8,13 +8,16 @@ from dataclasses import dataclass
 from itertools import product
 from typing import TYPE_CHECKING, Any
 
-from ema_model.actuator import keys
 from ema_model.actuator.actuator import Actuator
 from ema_model.actuator.parameters import (
+    CHOICES,
     CONTROLLER_KINDS,
+    ENTRY,
+    HEAD,
     INVERTER_KINDS,
     KINDS,
     SECTIONS,
+    TABLES,
     Facts,
     default_of,
     drives_of,
@@ -28,8 +31,7 @@ from ema_model.actuator.parameters import (
     unread,
 )
 from ema_model.files.written import inline
-from ema_model.quantities.axes import Axes
-from ema_model.quantities.numbers import number
+from ema_model.quantities import Axes, number
 
 if TYPE_CHECKING:
     from ema_model.effects.user import UserEffect
@@ -60,7 +62,7 @@ def _given(name: str, table: dict[str, Any]) -> dict[str, Any]:
 def _section(actuator: Actuator, section: str) -> dict[str, Any]:
     kinds = {"controller": actuator.controller.kind, "inverter": actuator.inverter.kind}
     silent = unread(**kinds)
-    is_kind = section in KINDS and (section != "inverter" or says_drive(kinds["controller"], kinds["inverter"]))
+    is_kind = section in CHOICES and (section != "inverter" or says_drive(kinds["controller"], kinds["inverter"]))
     entries: dict[str, Any] = {"kind": kinds[section]} if is_kind else {}
     for name in (name for names in layout(section, kinds) for name in names):
         value, path = float(getattr(getattr(actuator, section), name)), f"{section}.{name}"
@@ -89,14 +91,14 @@ def _effects(actuator: Actuator) -> dict[str, Any]:
 
 
 def _users(actuator: Actuator, effect: UserEffect) -> dict[str, Any]:
-    """The entries of a user's effect, as `ema_model.effects.user.entries` reads them."""
+    """The entries of a user's effect, as `ema_model.effects.user.torque` reads them."""
     entries: dict[str, Any] = {key: inline(value) for key, value in effect.definition.items()}
     values = {name: float(value) for name, value in actuator.effects[effect.name].items()}
     path = f"effects.{effect.name}"
     if effect.kind == "torque_curve":
         knots = inline([_entry(actuator, f"{path}.{name}", value) for name, value in values.items()])
         return {**entries, "values": knots.multiline(True)}
-    from ema_model.effects.user.entries import parameter_ranges
+    from ema_model.effects.user.torque import parameter_ranges
 
     ranges = parameter_ranges(effect)
     return entries | {n: _entry(actuator, f"{path}.{n}", value, ranges.get(n)) for n, value in values.items()}
@@ -219,15 +221,15 @@ def markdown() -> str:
         "Units are SI and end the names. On a linear axis a torque is a force, an inertia a mass and an angle",
         "a length, and the names say so: `inertia_kgm2` becomes `mass_kg`.",
         "",
-        *_table("Head", keys.HEAD),
-        *_table("A parameter: a number, or a table", keys.ENTRY),
-        *(line for name in ("axes", "model") for line in _table(f"[{name}]", keys.TABLES[name])),
+        *_table("Head", HEAD),
+        *_table("A parameter: a number, or a table", ENTRY),
+        *(line for name in ("axes", "model") for line in _table(f"[{name}]", TABLES[name])),
     ]
     rows = list(parameter_rows())
     for section in SECTIONS:
         lines += [f"## [{section}]", ""]
-        if section in keys.KINDS:
-            choices = "; ".join(f"`{name}` {meaning}" for name, meaning in keys.KINDS[section].items())
+        if section in KINDS:
+            choices = "; ".join(f"`{name}` {meaning}" for name, meaning in KINDS[section].items())
             lines += [f"`kind` is one of: {choices}.", ""]
         lines += ["| key | on a linear axis | means | unit | default | usual 1 σ | plausible | of |", "|---" * 8 + "|"]
         for row in rows:
@@ -246,7 +248,7 @@ def markdown() -> str:
     lines += ["| effect | key | on a linear axis | means | range | default |", "|---" * 6 + "|"]
     # The kernels take a while to import.
     from ema_model.effects import CATALOGUE
-    from ema_model.effects.user.entries import KEYS as USERS
+    from ema_model.effects.user.torque import KEYS as USERS
 
     for effect in CATALOGUE.values():
         for parameter in effect.parameters:
@@ -258,8 +260,8 @@ def markdown() -> str:
     for name, about in USERS.items():
         lines += _table(f"[effects.{name}]", about)
     for name in ("faults", "recordings"):
-        lines += _table(f"[{name}]", keys.TABLES[name])
-    lines += _table("[[recordings.where]]", keys.TABLES["recordings.where"])
+        lines += _table(f"[{name}]", TABLES[name])
+    lines += _table("[[recordings.where]]", TABLES["recordings.where"])
     return "\n".join(lines)
 
 

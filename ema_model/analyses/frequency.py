@@ -29,13 +29,16 @@ from numpy.typing import NDArray
 
 from ema_model.actuator import Actuator
 from ema_model.actuator.actuator import CURRENT_INPUTS, VOLTAGE_INPUTS
+from ema_model.commands import command
 from ema_model.errors import InputError
 from ema_model.files.opened import listed
 from ema_model.models import ClosedLoop
 from ema_model.models.loop_window import LoopWindow
-from ema_model.quantities.numbers import HALF_90
+from ema_model.quantities import HALF_90
 from ema_model.recordings import SIGNALS, Measurement
+from ema_model.recordings.measurement import Sensors
 from ema_model.result import Result
+from ema_model.simulation.run import Run, simulate_reference
 
 Array = NDArray[np.float64]
 Complex = NDArray[np.complexfloating[Any, Any]]
@@ -704,3 +707,18 @@ def _apart(frequency_Hz: Array, counts: NDArray[np.bool_], measured: Response, m
             ends = float(frequency_Hz[part[0]]), float(frequency_Hz[part[-1]])
             found.append(Apart(*ends, float(over[top]), float(frequency_Hz[top])))
     return tuple(sorted(found, key=lambda one: -abs(one.most_dB)))
+
+
+# --- a recording to try it on: a sweep over the resonance of a drive train that yields --------------------------------
+
+_DURATION_S = 6.0
+_SWEEP = {"start_Hz": 1.0, "end_Hz": 100.0, "end_time_s": _DURATION_S, "amplitude_rad": 0.002}
+_SENSORS = Sensors(current_noise_A=0.1)
+
+
+def sweep(actuator: Actuator) -> Measurement:
+    """Of an actuator whose transmission is elastic, as its model is not."""
+    true = simulate_reference(
+        Run(command("chirp", _SWEEP), _DURATION_S), actuator, effects={"torsional_compliance": {}}
+    )
+    return _SENSORS.record(true, seed=0)

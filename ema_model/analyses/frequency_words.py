@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 from ema_model.analyses.frequency import Apart, Estimate, FrequencyResponse, Mode, Response
-from ema_model.quantities.axes import SIGNALS
-from ema_model.quantities.numbers import amount, number, with_uncertainty
-from ema_model.quantities.titles import in_sentence
+from ema_model.quantities import SIGNALS, amount, in_sentence, number, with_uncertainty
 from ema_model.text import Document, Lines, Table
 
 _MOST_BANDS = 3  # in which the magnitudes differ, that are told

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from ema_model.campaign.plan import Plan, load_plan, plan_path, shipped_plans
-from ema_model.campaign.run import Status, duration, estimate_s, run_plan
-from ema_model.campaign.schedulers import scheduler
+from ema_model.campaign.run import Status, duration, estimate_s, run_plan, scheduler
 from ema_model.campaign.store import Store
 
 __all__ = [

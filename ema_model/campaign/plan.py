@@ -13,11 +13,24 @@ from typing import Any
 import msgspec
 
 from ema_model.actuator import Actuator, actuator_text, parse_actuator, shipped
-from ema_model.campaign import plan_axes
+from ema_model.campaign import task
 from ema_model.campaign.data_sets import folder_of
 from ema_model.campaign.kinds import KINDS
-from ema_model.campaign.plan_axes import AXES, MOST_TASKS, USUAL, Choice, check_count, choices_of, digest, run_of
-from ema_model.campaign.task import Excitation, File, Recorded, Simulated, Task
+from ema_model.campaign.task import (
+    AXES,
+    MOST_TASKS,
+    USUAL,
+    Choice,
+    Excitation,
+    File,
+    Recorded,
+    Simulated,
+    Task,
+    check_count,
+    choices_of,
+    digest,
+    run_of,
+)
 from ema_model.errors import InputError, quoted
 from ema_model.files.opened import TEXT_BYTES, listed, open_user_file, shipped_folder
 from ema_model.files.written import inline, toml_of, toml_text
@@ -259,10 +272,10 @@ class Group:
             value = {name: choice.at(seed) for name, choice in point.items()}
             load, effects = value["load_torque_Nm"], value["effects"]
             if isinstance(load, tuple):
-                load = load[1] if set(effects) & set(plan_axes.NEEDS_LOAD) else 0.0
+                load = load[1] if set(effects) & set(task.NEEDS_LOAD) else 0.0
             values = {}
             if value["tolerances"]:
-                values = plan_axes.base_parameters(self._actuator, which, value["tolerances"], seed)
+                values = task.base_parameters(self._actuator, which, value["tolerances"], seed)
             for path, more in value["off_by"].items():
                 values[path] = values.get(path, self._actuator.value(path)) + more
             self._actuator.with_values(values)  # a draw can be impossible

@@ -6,7 +6,12 @@ import os
 import socket
 import sys
 import time
+from contextlib import suppress
+from pathlib import Path
 from typing import Any
+
+from ema_model import kernel_cache
+from ema_model.files.written import FileLock
 
 # One worker takes one core: threads of the kernels and of the linear algebra would wait for those of the others.
 # Read when those libraries are imported, so a worker's process is begun with them.
@@ -82,7 +87,6 @@ def prepare() -> None:
     os.environ["EMAVIZ_COMPILE_AHEAD"] = "0"
     import numba
 
-    from ema_model.campaign.one_compiler import share_kernels
     from ema_model.simulation.compiled import always_library
 
     numba.set_num_threads(1)  # of this thread; where numba was there before
@@ -113,6 +117,37 @@ def memory_MB() -> float | None:
 def _answer(task: Any, kind: Any) -> dict[str, Any]:
     import msgspec
 
-    from ema_model.campaign.plan_axes import inputs_of
+    from ema_model.campaign.task import inputs_of
 
     return kind.run(inputs_of(task), msgspec.convert(task.settings, kind.settings), task.seed)
+
+
+# --- kernels are compiled once a host: whoever comes first compiles, the others wait and load what it has kept --------
+
+_LONGEST_S = 300.0  # to wait: a compilation takes seconds, and whoever holds the lock may have been stopped
+
+
+class Turns:
+    """Who may compile a kernel, by the file that it is kept in: one process of this host at a time."""
+
+    def __init__(self) -> None:
+        self._held: dict[Path, FileLock] = {}
+
+    def begin(self, path: Path) -> None:
+        """Returns when nobody else compiles this kernel."""
+        if path in self._held:
+            return
+        with suppress(OSError):  # no lock to be had in that folder: each compiles for itself
+            if (lock := FileLock.acquire(path.with_name(f"{path.name}.lock"), _LONGEST_S)) is not None:
+                self._held[path] = lock
+
+    def end(self, path: Path) -> None:
+        """Lets the next one look for the kernel."""
+        if (lock := self._held.pop(path, None)) is not None:
+            lock.release()
+
+
+def share_kernels() -> None:
+    """Makes this process take turns with the others of its host."""
+    if kernel_cache.turns is None:
+        kernel_cache.turns = Turns()

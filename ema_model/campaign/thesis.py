@@ -14,8 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ema_model import faults
 from ema_model.actuator import Actuator
-from ema_model.campaign.result import Campaign
-from ema_model.campaign.store import Store
+from ema_model.campaign.store import Campaign, Store
 from ema_model.commands import command
 from ema_model.faults import HEALTHY, NAMES, performance_coefficient, vector
 from ema_model.files.opened import shipped_folder

@@ -1,6 +1,6 @@
-"""The commands: each other file of this folder is one family, found by its `name`.
+"""The commands: each subclass of `Command` in a file of this folder is one, found by its `name`.
 
-To add a command, add a file with a subclass of `Command`.
+To add a command, add a class to `command`, or a file.
 """
 
 from __future__ import annotations
@@ -9,8 +9,7 @@ from collections.abc import Mapping
 from dataclasses import fields
 from typing import Any
 
-from ema_model.commands.command import Command
-from ema_model.commands.recorded import Recorded
+from ema_model.commands.command import Command, Recorded
 from ema_model.errors import InputError, did_you_mean, quoted
 from ema_model.members import classes
 

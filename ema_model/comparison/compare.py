@@ -26,7 +26,7 @@ from ema_model.estimation.problem import SIGNALS
 from ema_model.faults import checked, named
 from ema_model.models import Model, Window, model_for
 from ema_model.models.measured_motion import evaluation_stretches, fit_stretches, later, with_delay_of_drive
-from ema_model.quantities.numbers import check_number
+from ema_model.quantities import check_number
 from ema_model.recordings import SIGNALS as SIGNAL_KINDS
 from ema_model.recordings import Measurement
 from ema_model.recordings.health import health_of

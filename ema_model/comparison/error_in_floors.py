@@ -13,7 +13,7 @@ from ema_model.comparison.residuals import Residuals
 from ema_model.estimation import Floor
 from ema_model.estimation.floor import POSITIONS, SPEED, band, least, spread
 from ema_model.models import Window
-from ema_model.quantities.numbers import number
+from ema_model.quantities import number
 from ema_model.text import Severity
 
 _FAR = 2.0  # floors, from which on an error stands out, where a true model's is not as large

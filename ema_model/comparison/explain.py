@@ -12,8 +12,7 @@ from numpy.typing import NDArray
 from scipy.ndimage import median_filter
 
 from ema_model.comparison.residuals import Residuals, explanation_sentence
-from ema_model.quantities.axes import Axes
-from ema_model.quantities.variables import MODULATORS, VARIABLES
+from ema_model.quantities import MODULATORS, VARIABLES, Axes
 from ema_model.recordings import SIGNALS
 from ema_model.result import NULL, as_named
 

@@ -21,8 +21,7 @@ from ema_model.actuator import Actuator
 from ema_model.errors import InputError
 from ema_model.models import Model, Window
 from ema_model.models.open_loop import FreeMotion, free_motion
-from ema_model.quantities.axes import SIGNALS, of_signal
-from ema_model.quantities.titles import in_sentence
+from ema_model.quantities import SIGNALS, in_sentence, of_signal
 from ema_model.recordings import Measurement
 from ema_model.result import NULL
 

@@ -18,7 +18,7 @@ from ema_model.comparison.criteria import AT_BOUNDS, LAG_APART, LAG_SAMPLES, MIS
 from ema_model.estimation import Calibration
 from ema_model.estimation.floor import POSITIONS
 from ema_model.models import Model, Window
-from ema_model.quantities.numbers import number
+from ema_model.quantities import number
 
 Array = NDArray[np.float64]
 

@@ -25,7 +25,7 @@ from ema_model.comparison.criteria import (
 from ema_model.comparison.error_in_floors import ratio
 from ema_model.comparison.explain import Explanation, modulator_of, quantile_knots, used_blocks, without_spikes
 from ema_model.comparison.residuals import Residuals, event_sentence, range_text, region_sentence
-from ema_model.quantities.axes import Axes
+from ema_model.quantities import Axes
 from ema_model.recordings import SIGNALS
 from ema_model.result import NULL, as_named
 

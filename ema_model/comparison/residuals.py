@@ -12,10 +12,17 @@ from ema_model.actuator import Actuator
 from ema_model.effects import find
 from ema_model.estimation import Calibration, Floor
 from ema_model.models import Model, Window
-from ema_model.quantities.axes import Axes, of_residual
-from ema_model.quantities.numbers import Quantity, number
-from ema_model.quantities.titles import in_sentence
-from ema_model.quantities.variables import MODULATORS, VARIABLES, is_turn, of_variable
+from ema_model.quantities import (
+    MODULATORS,
+    VARIABLES,
+    Axes,
+    Quantity,
+    in_sentence,
+    is_turn,
+    number,
+    of_residual,
+    of_variable,
+)
 from ema_model.recordings import SIGNALS
 from ema_model.simulation.pack import reduced_circuit
 
@@ -45,7 +52,7 @@ class Adjustable:
 class Residuals:
     """Measurement minus model, by signal, per block, of one recording or of several joined; arrays are (blocks,).
 
-    `variables` has those of `quantities.variables` that are known, in their units: the motor's angle not wrapped, the
+    `variables` has those of `quantities.VARIABLES` that are known, in their units: the motor's angle not wrapped, the
     acceleration the motor's, the load at the user, the time since the recording's start.  A value that a recording
     does not have is NaN; so is a residual that a recording lacks.
     """

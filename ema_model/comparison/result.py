@@ -19,10 +19,17 @@ from ema_model.comparison.free_simulation import FreeError, Score, Simulated, er
 from ema_model.comparison.regions import Event, Region
 from ema_model.comparison.residuals import Residuals, dependence
 from ema_model.estimation.calibrate import Calibration, KnownTogether, calibration_table, combinations, together
-from ema_model.quantities.axes import ROTARY, Axes, of_residual, of_signal
-from ema_model.quantities.numbers import Quantity, number
-from ema_model.quantities.titles import all_of, in_sentence
-from ema_model.quantities.variables import of_variable
+from ema_model.quantities import (
+    ROTARY,
+    Axes,
+    Quantity,
+    all_of,
+    in_sentence,
+    number,
+    of_residual,
+    of_signal,
+    of_variable,
+)
 from ema_model.recordings import Measurement
 from ema_model.recordings.health import Health
 from ema_model.recordings.noise import least_noise

@@ -18,9 +18,7 @@ from ema_model.comparison.residuals import OPEN_LOOP, Residuals, dependence, ord
 from ema_model.comparison.result import Compared, SignalError
 from ema_model.estimation import Calibration
 from ema_model.estimation.floor import CONSTANT, CORRELATED_S, ORDER_OF_PRIMARY
-from ema_model.quantities.axes import of_residual, of_signal
-from ema_model.quantities.numbers import Quantity
-from ema_model.quantities.titles import all_of, in_sentence
+from ema_model.quantities import Quantity, all_of, in_sentence, of_residual, of_signal
 from ema_model.recordings import SIGNALS
 
 Array = NDArray[np.float64]

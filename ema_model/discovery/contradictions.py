@@ -27,9 +27,7 @@ from ema_model.effects import catalogue_name, find
 from ema_model.errors import InputError
 from ema_model.estimation import calibrate
 from ema_model.estimation.model_fit import Data, Fit, fit, floor_ratio, gather, holdout_change, resimulated
-from ema_model.quantities.axes import Axes, of_signal
-from ema_model.quantities.numbers import amount, number
-from ema_model.quantities.titles import in_sentence
+from ema_model.quantities import Axes, amount, in_sentence, number, of_signal
 from ema_model.recordings import Measurement
 
 Array = NDArray[np.float64]

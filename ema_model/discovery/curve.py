@@ -20,7 +20,7 @@ from ema_model.discovery.refit import Trial
 from ema_model.discovery.remaining import residuals_left
 from ema_model.discovery.result import Candidate
 from ema_model.effects.user import UserEffect, torque_curve
-from ema_model.effects.user.curve import MOST_KNOTS, OF_VARIABLE
+from ema_model.effects.user.torque import MOST_KNOTS, OF_VARIABLE
 from ema_model.errors import InputError
 from ema_model.estimation.model_fit import Data, Fit, fit
 

@@ -21,7 +21,7 @@ from ema_model.discovery.verify import free_simulation
 from ema_model.discovery.words import as_well, held_back, mismatch, untold
 from ema_model.effects import CATALOGUE
 from ema_model.errors import InputError, quoted
-from ema_model.quantities.numbers import as_number
+from ema_model.quantities import as_number
 from ema_model.recordings import Measurement
 
 Progress = Callable[[str], None]

@@ -22,8 +22,7 @@ from ema_model.discovery.uncertainty import colour, signals_of
 from ema_model.effects import catalogue_name, find
 from ema_model.effects.effect import ANGLES
 from ema_model.estimation.model_fit import Data, Fit
-from ema_model.quantities.numbers import number
-from ema_model.quantities.titles import in_sentence
+from ema_model.quantities import in_sentence, number
 from ema_model.recordings import SIGNALS
 
 Array = NDArray[np.float64]

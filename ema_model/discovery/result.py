@@ -30,9 +30,7 @@ from ema_model.estimation.calibrate import KnownTogether, combinations
 from ema_model.estimation.model_fit import Data
 from ema_model.faults import BY_NAME
 from ema_model.models import Model
-from ema_model.quantities.axes import Axes
-from ema_model.quantities.numbers import amount
-from ema_model.quantities.titles import all_of, in_sentence
+from ema_model.quantities import Axes, all_of, amount, in_sentence
 from ema_model.result import FLAT, NAME, NULL, Result, as_named
 
 Array = NDArray[np.float64]

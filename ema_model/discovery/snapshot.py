@@ -21,10 +21,10 @@ from ema_model.discovery.search import refits_beside
 from ema_model.discovery.words import primary
 from ema_model.effects import find
 from ema_model.effects.user import Expression
-from ema_model.effects.user.beginnings import Size, beginnings
+from ema_model.effects.user.expression import Size, beginnings
 from ema_model.estimation.model_fit import floor_ratio
 from ema_model.faults import BY_NAME, causes
-from ema_model.quantities.numbers import HALF_90
+from ema_model.quantities import HALF_90
 
 Array = NDArray[np.float64]
 Known = TypeVar("Known")

@@ -21,7 +21,7 @@ from ema_model.estimation.calibrate import calibrated, problem_of
 from ema_model.estimation.information import by_pieces, posterior
 from ema_model.estimation.model_fit import Data, Fit, fit
 from ema_model.models import Model
-from ema_model.quantities.numbers import HALF_90
+from ema_model.quantities import HALF_90
 from ema_model.remembered import remembered
 
 Array = NDArray[np.float64]

@@ -39,10 +39,7 @@ from ema_model.effects.effect import FAMILIES
 from ema_model.estimation import Calibrated
 from ema_model.estimation.calibrate import together
 from ema_model.faults import BY_NAME, FAULTS, NAMES, cause_of, causes, vector
-from ema_model.quantities.axes import Axes, of_signal
-from ema_model.quantities.numbers import Quantity, amount, number, with_uncertainty
-from ema_model.quantities.sides import USER
-from ema_model.quantities.titles import all_of, in_sentence
+from ema_model.quantities import USER, Axes, Quantity, all_of, amount, in_sentence, number, of_signal, with_uncertainty
 from ema_model.simulation.run import run_in_words
 from ema_model.text import Document, Facts, Lines, Note, Table
 

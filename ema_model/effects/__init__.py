@@ -11,8 +11,7 @@ from typing import TypeVar
 from ema_model.effects.effect import Effect, Parameter
 from ema_model.errors import InputError, did_you_mean, quoted
 from ema_model.members import members
-from ema_model.quantities.axes import ROTARY, Axes
-from ema_model.quantities.sides import MOTOR, NEITHER, USER
+from ema_model.quantities import MOTOR, NEITHER, ROTARY, USER, Axes
 
 __all__ = ["CATALOGUE", "MOTOR", "NEITHER", "USER", "Effect", "Parameter", "catalogue_name", "find", "register"]
 

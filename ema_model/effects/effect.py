@@ -8,12 +8,20 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 from ema_model.errors import InputError, did_you_mean, quoted
-from ema_model.quantities.axes import ROTARY, Axes
-from ema_model.quantities.numbers import check_number
-from ema_model.quantities.si import linear_unit
-from ema_model.quantities.sides import MOTOR, NEITHER, USER, Side
-from ema_model.quantities.titles import labelled, parameter_title, unit_of
-from ema_model.quantities.variables import VARIABLES
+from ema_model.quantities import (
+    MOTOR,
+    NEITHER,
+    ROTARY,
+    USER,
+    VARIABLES,
+    Axes,
+    Side,
+    check_number,
+    labelled,
+    linear_unit,
+    parameter_title,
+    unit_of,
+)
 
 __all__ = ["ADVANCE", "ANGLES", "MOTOR", "NEITHER", "PLACES", "USER", "Effect", "Parameter"]  # what effects' files need
 
@@ -186,7 +194,7 @@ class Effect:
     terms: tuple[str, ...] = ()
     by_direction: bool = False  # told from what does not turn over with the direction: needs motion both ways
     turns: Side | None = None  # of a part that turns on that side: there is none on a linear axis
-    against: str = "time"  # of `quantities.variables`: what its residual follows; time where it follows nothing else
+    against: str = "time"  # of `quantities.VARIABLES`: what its residual follows; time where it follows nothing else
     nothing: float = 0.0  # the first parameter, the others at their defaults, with which kernels go on as without it
     name: str = ""  # of the file; the catalogue fills it in
 

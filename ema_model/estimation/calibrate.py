@@ -30,9 +30,7 @@ from ema_model.estimation.problem import (
 from ema_model.faults import FACTORS, NAMES, named
 from ema_model.models import Model
 from ema_model.models.model import Signals
-from ema_model.quantities.axes import Axes
-from ema_model.quantities.numbers import HALF_90, number, with_uncertainty
-from ema_model.quantities.titles import in_sentence
+from ema_model.quantities import HALF_90, Axes, in_sentence, number, with_uncertainty
 from ema_model.result import NAME, as_named
 from ema_model.side_by_side import windows
 from ema_model.text import Severity, Table

@@ -12,8 +12,7 @@ from scipy.ndimage import maximum_filter1d, minimum_filter1d, uniform_filter1d
 from ema_model.actuator import Actuator
 from ema_model.models import Model, Window
 from ema_model.models.model import Signals
-from ema_model.quantities.axes import SIGNALS
-from ema_model.quantities.numbers import HALF_90
+from ema_model.quantities import HALF_90, SIGNALS
 from ema_model.recordings.noise import SCATTER, white_noise
 
 # --- how well a floor is known: between which multiples of it the error of a true model lies --------------------------

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from ema_model.quantities.numbers import HALF_90
+from ema_model.quantities import HALF_90
 
 if TYPE_CHECKING:
     from ema_model.estimation.problem import Problem

@@ -15,8 +15,7 @@ from ema_model.actuator import Actuator
 from ema_model.errors import InputError, did_you_mean, quoted
 from ema_model.exports import c, fmu, mjcf, python
 from ema_model.exports.exported import Exported, exported
-from ema_model.exports.replay import Proof, proof_of, replayed, shortened
-from ema_model.exports.result import Export, TargetProof
+from ema_model.exports.replay import Export, Proof, TargetProof, proof_of, replayed, shortened
 from ema_model.recordings import Measurement
 
 Progress = Callable[[str], None]

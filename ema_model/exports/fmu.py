@@ -25,7 +25,7 @@ from numpy.typing import NDArray
 from ema_model.errors import InputError, quoted
 from ema_model.exports import c
 from ema_model.exports.exported import Exported, Field
-from ema_model.quantities.sides import MOTOR, USER
+from ema_model.quantities import MOTOR, USER
 
 Array = NDArray[np.float64]
 

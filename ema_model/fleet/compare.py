@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+import os
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,17 +15,46 @@ from ema_model.actuator.parameters import low_limit, on_axes, path_inside
 from ema_model.errors import InputError, quoted
 from ema_model.estimation import default_free
 from ema_model.estimation.problem import SIGNALS
-from ema_model.fleet.block import Block, pooled, starts_at, unit_of
+from ema_model.fleet.block import Block, Pair, Pool, pooled, starts_at, unit_of
 from ema_model.fleet.block import linearised as linearised_at
-from ema_model.fleet.criteria import MISFIT, REFUSED, REFUSED_SHARE, SLOPE, TOLD, UNTOLD
-from ema_model.fleet.fit import Fitted, Together, fit, together
-from ema_model.fleet.pool import Pair, Pool
-from ema_model.fleet.result import Alone, Difference, Need, OfRecording, OfType, Transfer, UnitsCompared
-from ema_model.fleet.select import alike
-from ema_model.quantities.numbers import HALF_90
-from ema_model.recordings import Measurement
+from ema_model.fleet.fit import Fitted, Together, alike, fit, together
+from ema_model.fleet.result import (
+    MISFIT,
+    REFUSED,
+    REFUSED_SHARE,
+    SLOPE,
+    TOLD,
+    UNTOLD,
+    Alone,
+    Difference,
+    Need,
+    OfRecording,
+    OfType,
+    Transfer,
+    UnitsCompared,
+)
+from ema_model.quantities import HALF_90
+from ema_model.recordings import Measurement, check_one_actuator
 from ema_model.recordings.read import check_same_actuator, prepared
-from ema_model.recordings.recording_set import check_held_out
+from ema_model.recordings.recording_set import check_held_out, recordings_in
+
+# --- units as folders of recordings: which recording is of which unit, and whether all are of one type ----------------
+
+
+def units_in(folder: Path) -> dict[str, list[Path]]:
+    """The recordings of each folder in a folder, by its name; InputError where there are not two with any."""
+    inner = sorted(one for one in folder.iterdir() if one.is_dir() and not one.name.startswith("."))
+    found = {one.name: recordings_in(one) for one in inner}
+    found = {name: files for name, files in found.items() if files}
+    if not found:
+        raise InputError(f"{quoted(folder.name)}: holds no folders of recordings, of which each would be a unit")
+    return found
+
+
+def check_same_type(files: Iterable[str | os.PathLike[str]]) -> None:
+    """InputError for recordings whose side files name different actuators: units are of one type."""
+    check_one_actuator(files, "units that are compared are of one type")
+
 
 # --- the model of each unit on the recordings of each other one -------------------------------------------------------
 

@@ -15,8 +15,7 @@ from ema_model.fleet.compare import check_units, compare_units
 from ema_model.fleet.result import UnitsCompared, and_so_on, notes, rests_on
 from ema_model.fleet.result import document_of as document_of_compared
 from ema_model.fleet.result import sentences as of_differences
-from ema_model.quantities.numbers import number
-from ema_model.quantities.titles import in_sentence
+from ema_model.quantities import in_sentence, number
 from ema_model.recordings import Measurement
 from ema_model.result import Result, as_named
 from ema_model.text import Block, Document, Lines, Note, Table

@@ -19,7 +19,7 @@ from ema_model.identification.fit import Fitted
 from ema_model.models.closed_loop import ClosedLoop
 from ema_model.models.loop_window import BLOCK_S, LoopWindow
 from ema_model.physics.rows import LANES
-from ema_model.quantities.numbers import amount
+from ema_model.quantities import amount
 from ema_model.recordings import Measurement
 from ema_model.simulation.pack import initial_state, monitor_rows
 from ema_model.simulation.plant import FITNESSES

@@ -23,9 +23,7 @@ from ema_model.estimation.problem import ECCENTRICITY, K_SIGMA, Problem, polar, 
 from ema_model.identification.fit import FAULTS, TWINS, Fitted
 from ema_model.identification.search import logged_apart
 from ema_model.models import ClosedLoop
-from ema_model.quantities.axes import of_signal
-from ema_model.quantities.numbers import HALF_90
-from ema_model.quantities.titles import in_sentence
+from ema_model.quantities import HALF_90, in_sentence, of_signal
 from ema_model.recordings import SIGNALS as SIGNAL_NAMES
 from ema_model.result import as_named
 from ema_model.simulation.run import Run, simulate_monitor

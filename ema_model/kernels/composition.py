@@ -7,8 +7,8 @@ model's, and their own states from row `first` on.
 
 from __future__ import annotations
 
-from ema_model.physics.controller import cascade_controller as control
-from ema_model.physics.drive import reduced_drive as advance_current
+from ema_model.physics.equations import cascade_controller as control
+from ema_model.physics.equations import reduced_drive as advance_current
 from ema_model.physics.jit import scalar
 
 __all__ = [

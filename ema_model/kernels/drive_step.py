@@ -7,8 +7,8 @@ to the last bit, and is left out (`is_driven`).
 
 from __future__ import annotations
 
-from ema_model.physics.controller import advance_speed_loop, speed_reference
 from ema_model.physics.elementary import clamp
+from ema_model.physics.equations import advance_speed_loop, speed_reference
 from ema_model.physics.jit import scalar
 from ema_model.physics.rows import (
     BEGUN,

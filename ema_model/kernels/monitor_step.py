@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-from ema_model.physics.backlash import advance_play
 from ema_model.physics.elementary import clamp, rotate
-from ema_model.physics.friction import advance_reversing_rotor, borello_friction
+from ema_model.physics.equations import advance_play, advance_reversing_rotor, borello_friction, flux_factor
 from ema_model.physics.jit import scalar
-from ema_model.physics.phases import flux_factor
 from ema_model.physics.rows import (
     BUS_VOLTAGE,
     COS_ELECTRICAL,

@@ -5,18 +5,19 @@ Its state is a tuple, so that one run alone keeps it in registers; a population 
 
 from __future__ import annotations
 
-from ema_model.physics.backlash import advance_play
 from ema_model.physics.elementary import clamp, rotate
-from ema_model.physics.friction import advance_rotor, borello_friction
-from ema_model.physics.inverter import relay
-from ema_model.physics.jit import scalar
-from ema_model.physics.phases import (
+from ema_model.physics.equations import (
+    advance_play,
+    advance_rotor,
     air_gap,
+    borello_friction,
     equivalent_current,
     minus_120,
     plus_120,
+    relay,
     winding_coefficients,
 )
+from ema_model.physics.jit import scalar
 from ema_model.physics.rows import (
     BUS_VOLTAGE,
     COS_ELECTRICAL,

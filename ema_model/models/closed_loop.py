@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ema_model.actuator import Actuator
 from ema_model.commands import Recorded
-from ema_model.commands.recorded import jumps
+from ema_model.commands.command import jumps
 from ema_model.effects import find
 from ema_model.errors import InputError
 from ema_model.models.loop_window import BLOCK_S, COMPARED, LoopWindow, cut

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ema_model.actuator import Actuator
 from ema_model.actuator.actuator import CURRENT_INPUTS, VOLTAGE_INPUTS, coarsest_step
-from ema_model.commands.recorded import between
+from ema_model.commands.command import between
 from ema_model.errors import InputError, quoted
 from ema_model.models.model import Window
 from ema_model.recordings import SIGNALS, Measurement

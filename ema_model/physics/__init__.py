@@ -1,4 +1,4 @@
-"""The physics, one idea a file: scalar functions that numba inlines into the kernels.
+"""The physics: scalar functions that numba inlines into the kernels.
 
 Units are SI (rad, rad/s, A, V, N·m, s), on the motor side unless a name says `user`.
 """

@@ -2,17 +2,27 @@
 
 from __future__ import annotations
 
-from ema_model.quantities.axes import SIGNALS, Signal
-from ema_model.recordings.column_guess import guess_mapping
+from ema_model.quantities import SIGNALS, Signal
 from ema_model.recordings.column_mapping import (
     ColumnMapping,
     MappedColumn,
     Reading,
     apply_mapping,
+    guess_mapping,
     parse_mapping,
 )
 from ema_model.recordings.measurement import Measurement, can_have_current, with_equivalent_current
-from ema_model.recordings.read import check_needed, hints_of, prepared, read, read_columns, read_head, read_header
+from ema_model.recordings.read import (
+    check_needed,
+    check_target,
+    hints_of,
+    prepared,
+    read,
+    read_columns,
+    read_head,
+    read_header,
+    write_measurement,
+)
 from ema_model.recordings.side_file import (
     SideFile,
     change_side_file,
@@ -22,7 +32,6 @@ from ema_model.recordings.side_file import (
     side_path,
     write_side_file,
 )
-from ema_model.recordings.write import check_target, write_measurement
 
 __all__ = [
     "SIGNALS",

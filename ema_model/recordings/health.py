@@ -12,9 +12,7 @@ from numpy.typing import NDArray
 
 from ema_model.actuator import Actuator
 from ema_model.files.opened import listed, shown
-from ema_model.quantities.axes import SIGNALS
-from ema_model.quantities.numbers import amount
-from ema_model.quantities.titles import in_sentence
+from ema_model.quantities import SIGNALS, amount, in_sentence
 from ema_model.recordings import noise as estimates
 from ema_model.recordings.column_mapping import MappedColumn
 from ema_model.recordings.measurement import PHASES, Measurement

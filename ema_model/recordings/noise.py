@@ -11,7 +11,7 @@ from math import comb
 import numpy as np
 from numpy.typing import NDArray
 
-from ema_model.quantities.axes import SIGNALS
+from ema_model.quantities import SIGNALS
 
 # --- the white noise of a recorded signal, from the signal itself -----------------------------------------------------
 

@@ -1,4 +1,4 @@
-"""The one way in: a file, its columns, units and checks, as a measurement."""
+"""The one way in and out: a file, its columns, units and checks, as a measurement; and a measurement as a file."""
 
 from __future__ import annotations
 
@@ -19,34 +19,36 @@ from ema_model.actuator import Actuator
 from ema_model.actuator.actuator import CURRENT_INPUTS, VOLTAGE_INPUTS
 from ema_model.errors import InputError, did_you_mean, quoted
 from ema_model.files.opened import COLUMNS, FILE_BYTES, RUNS, check_user_file, listed, megabytes, reason, refusal, shown
-from ema_model.quantities.axes import SIGNALS, lookalikes, looks_like_time
-from ema_model.recordings.column_guess import doubt, guess_mapping
+from ema_model.files.written import whole_file
+from ema_model.quantities import SIGNALS, lookalikes, looks_like_time
 from ema_model.recordings.column_mapping import (
     ColumnMapping,
     MappedColumn,
     Reading,
     apply_mapping,
+    doubt,
+    guess_mapping,
     parse_mapping,
     unit_in_name,
     with_places,
     without_unit,
 )
-from ema_model.recordings.exports import known_export
-from ema_model.recordings.formats import Format, format_of
-from ema_model.recordings.formats.clocks import Clocks
+from ema_model.recordings.column_names import known_export
+from ema_model.recordings.formats import WRITTEN, Format, format_of
+from ema_model.recordings.formats.format import Clocks
 from ema_model.recordings.formats.text_layout import Head, Hints, by_number
 from ema_model.recordings.measurement import (
     ALONG_A_MAP,
     PHASES,
     Measurement,
     along_map,
+    unwrapped,
     with_current,
     with_motor_side,
     with_third_phase,
     without_delays,
 )
 from ema_model.recordings.side_file import SideFile, find_side_file, read_side_file
-from ema_model.recordings.wrapping import unwrapped
 
 # --- a file of any format as columns, and as a measurement once it is known which column is which signal --------------
 # `ema_model.recordings.read` is the way in; this is what it is built on.
@@ -651,3 +653,40 @@ def _to_be_said(
         if all(part in there or part in doubts for part in parts):
             return [part for part in parts if part not in there]
     return [group[0]]
+
+
+# --- writes a measurement to a file of any format ---------------------------------------------------------------------
+
+
+def write_measurement(measurement: Measurement, path: str | os.PathLike[str]) -> None:
+    """Writes all signals in the format that the suffix names; the file appears whole or not at all.
+
+    An older file of that name is replaced; folders are not made.  Raises InputError for a place that cannot
+    be written and for values that are not finite, which no reader would take back.
+    """
+    path = os.fspath(path)
+    check_target(path)
+    write = format_of(path, WRITTEN).write
+    assert write is not None
+    check_finite(path, measurement.signals, lambda row: f"sample {row + 1}")
+    try:
+        with whole_file(path) as draft:
+            write(measurement.signals, os.fspath(draft))
+    except OSError as error:
+        raise refusal(path, f"cannot be written ({reason(error)}); check the disk and the permissions") from None
+
+
+def check_target(path: str | os.PathLike[str]) -> None:
+    """Raises InputError unless a measurement can be written there; to be asked before a long run."""
+    path = os.fspath(path)
+    if os.path.isdir(path):
+        raise refusal(path, "is a folder; the name of a file is expected")
+    format_of(path, WRITTEN)
+    target = os.path.realpath(path)
+    folder = os.path.dirname(target)
+    if not os.path.isdir(folder):
+        raise refusal(path, f"there is no folder {shown(os.path.dirname(path) or folder, 200)!r}; make it first")
+    if os.path.exists(target) and not os.path.isfile(target):
+        raise refusal(path, "is not a regular file; take another name")
+    if not os.access(folder, os.W_OK):
+        raise refusal(path, "no permission to write into its folder; take another folder")

@@ -13,7 +13,7 @@ import numpy as np
 
 from ema_model.errors import InputError
 from ema_model.files.opened import listed, refusal, shown
-from ema_model.recordings.formats import FORMATS, robot_dataset
+from ema_model.recordings.formats import FORMATS, parquet
 from ema_model.recordings.measurement import Measurement
 from ema_model.recordings.read import TooShort
 
@@ -37,7 +37,7 @@ def files_of(text: str, *, in_folders: bool = False) -> list[str]:
     """
     path = Path(text)
     if os.path.isdir(text):
-        if episodes := robot_dataset.files_in(text):
+        if episodes := parquet.files_in(text):
             return episodes
         found = [str(one) for one in recordings_in(path)]
         if not found and in_folders:
@@ -97,7 +97,7 @@ def long_enough(
 
 def column_of_runs(file: str) -> str:
     """The column that tells a file's recordings apart where its format has several in one, else ""."""
-    return robot_dataset.EPISODE if robot_dataset.has_episodes(file) else ""
+    return parquet.EPISODE if parquet.has_episodes(file) else ""
 
 
 def episodes_of(measurement: Measurement, file: str) -> list[Measurement]:
@@ -105,7 +105,7 @@ def episodes_of(measurement: Measurement, file: str) -> list[Measurement]:
     entry = measurement.reading.mapping.get("segment")
     if entry is None or entry.column != column_of_runs(file):
         return [measurement]
-    return [replace(run, name=robot_dataset.episode(index)) for index, run in _runs(measurement)]
+    return [replace(run, name=parquet.episode(index)) for index, run in _runs(measurement)]
 
 
 def runs_of(measurement: Measurement) -> list[Measurement]:

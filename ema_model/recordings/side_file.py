@@ -13,8 +13,7 @@ from typing import Any, Literal, cast
 from ema_model.errors import InputError, quoted
 from ema_model.files.opened import TEXT_BYTES, listed, open_user_file, reason, refusal, shown
 from ema_model.files.written import change_file, inline, toml_of, toml_text
-from ema_model.quantities.axes import SIGNALS
-from ema_model.quantities.si import of_name, without_unit
+from ema_model.quantities import SIGNALS, of_name, without_unit
 from ema_model.recordings.column_mapping import NUMBERS, ColumnMapping, MappedColumn, parse_mapping
 from ema_model.recordings.formats.text_layout import Hints, known_encoding
 

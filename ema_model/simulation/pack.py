@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from ema_model import faults
 from ema_model.actuator import Actuator
 from ema_model.effects import CATALOGUE, catalogue_name
-from ema_model.physics.phases import flux_harmonics
+from ema_model.physics.equations import flux_harmonics
 from ema_model.physics.rows import LANES, REFERENCE_STATE_ROWS, STATE_ROWS
 from ema_model.stacks import Stack
 

@@ -15,10 +15,7 @@ from ema_model.commands import COMMANDS, Command, command
 from ema_model.effects import find
 from ema_model.errors import InputError, did_you_mean, quoted
 from ema_model.physics.rows import LANES
-from ema_model.quantities.axes import ROTARY, Axes
-from ema_model.quantities.numbers import check_number
-from ema_model.quantities.sides import USER
-from ema_model.quantities.titles import in_sentence, parameter_title, unit_of
+from ema_model.quantities import ROTARY, USER, Axes, check_number, in_sentence, parameter_title, unit_of
 from ema_model.recordings import Measurement
 from ema_model.side_by_side import blocks
 from ema_model.simulation.compiled import stack_at_hand, wait_for

@@ -53,7 +53,7 @@ class WithEffect:
         return float(np.sqrt(np.mean(change**2))) / (float(np.ptp(self.without[name])) or 1.0), change
 
     def against(self, variable: str) -> Array:
-        """A variable of `ema_model.quantities.variables` in the run with the effect, (samples,), in its unit.
+        """A variable of `ema_model.quantities.VARIABLES` in the run with the effect, (samples,), in its unit.
 
         KeyError for one that no run has: a temperature.
         """

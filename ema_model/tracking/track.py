@@ -1,24 +1,132 @@
-"""Follows k over the flights of one unit."""
+"""Follows k over the flights of one unit: what is found, how, after each flight, and all of it in words."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections import Counter
+from collections.abc import Iterator, Mapping, Sequence
+from copy import copy
+from dataclasses import dataclass, replace
+from itertools import combinations
+from typing import Annotated
 
 import numpy as np
+from msgspec import Meta
 from numpy.typing import NDArray
 
 from ema_model import faults
 from ema_model.errors import InputError, did_you_mean, quoted
 from ema_model.estimation.problem import ECCENTRICITY
-from ema_model.quantities.numbers import HALF_90, check_number
-from ema_model.tracking.evidence import LEAST_FLIGHTS, LONGEST, MISFIT_SHARE, MISFIT_WINDOW, WORN_BEFORE
-from ema_model.tracking.flights import Flight
-from ema_model.tracking.remaining import Wear, remaining, wear
-from ema_model.tracking.result import FaultTrack, Jump, LeftOut, Tracked
-from ema_model.tracking.series import Series
+from ema_model.quantities import HALF_90, check_number, in_sentence, number
+from ema_model.result import Result
+from ema_model.text import Document, Lines, Note, Table
+from ema_model.tracking.flights import Flight, Series
+from ema_model.tracking.trends import (
+    AHEAD,
+    LEAST_FLIGHTS,
+    LONGEST,
+    MISFIT_SHARE,
+    MISFIT_WINDOW,
+    WORN_BEFORE,
+    Crossing,
+    Remaining,
+    Wear,
+    remaining,
+    wear,
+)
+
+# --- what is found ----------------------------------------------------------------------------------------------------
 
 Array = NDArray[np.float64]
+Interval = tuple[float, float]
+
+
+@dataclass(frozen=True, eq=False)
+class Jump:
+    """A sudden step of k."""
+
+    flight: Annotated[str, Meta(description="the first one after it")]
+    before: Annotated[float, Meta(description="k before it")]
+    after: Annotated[float, Meta(description="k after it")]
+    replaced: Annotated[bool, Meta(description="whether it goes towards healthy, as after a part was replaced")]
+
+
+@dataclass(frozen=True)
+class LeftOut:
+    """A flight that does not count."""
+
+    flight: Annotated[str, Meta(description="its name")]
+    reason: Annotated[str, Meta(description="why")]
+
+
+@dataclass(frozen=True, eq=False)
+class FaultTrack:
+    """One k over the flights, 0 … 1, less what the unit's base parameters are found to add."""
+
+    name: str
+    trend: Annotated[bool, Meta(description="whether there is evidence that it drifts")]
+    level: Annotated[float, Meta(description="k after the last flight")]
+    # with what the unit's base parameters may add more or less
+    level_interval90: Annotated[Interval, Meta(description="the ends of the 90 % interval about level")]
+    drift: Annotated[float, Meta(description="of k in a flight; 0 without a trend")]
+    drift_interval90: Annotated[Interval, Meta(description="the ends of the 90 % interval about drift")]
+    since: Annotated[str | None, Meta(description="the flight after which the evidence for a trend sufficed")]
+    threshold: Annotated[float | None, Meta(description="of k, at which the life ends; null: none was given")]
+    remaining_flights: Annotated[Remaining | None, Meta(description="null: see reason")]
+    reason: Annotated[str | None, Meta(description="why nothing is said of the remaining flights")]
+    jumps: Annotated[tuple[Jump, ...], Meta(description="in the order of the flights")]
+    log_evidence: Annotated[float, Meta(description="natural logarithm, of a trend against none")]
+    k: Annotated[Array, Meta(description="of each flight that counts")]
+    sigma: Annotated[Array, Meta(description="1 σ of each k, of the flight's own noise")]
+    excluded: Annotated[tuple[LeftOut, ...], Meta(description="flights that do not count; the same for every k")]
+
+    @property
+    def crossing_probability(
+        self,
+    ) -> Annotated[tuple[Crossing, ...], Meta(description="empty where remaining_flights is null")]:
+        """Of several numbers of flights."""
+        return () if self.remaining_flights is None else self.remaining_flights.crossing
+
+
+@dataclass(frozen=True, repr=False, eq=False)
+class Tracked(Result):
+    """What the flights of one unit tell, after the last one."""
+
+    flights: tuple[Flight, ...]
+    faults: Annotated[dict[str, FaultTrack], Meta(description="k1 … k8, without the angle k7")]
+    correlation: Annotated[  # what trades against what
+        Array,
+        Meta(
+            description="(8, 8), of the errors of k1 … k8 in one flight; in place of k6 and k7 their vector's parts",
+            extra={"dimensions": 2},
+        ),
+    ]
+    trusted: Annotated[bool, Meta(description="whether the model fits the last flights")]
+    warnings: Annotated[tuple[str, ...], Meta(description="what the answer must be read with")]
+    seed: int
+    actuator: str = ""  # its name
+
+    @property
+    def answer(self) -> Annotated[str, Meta(description="in one sentence")]:
+        """The first line of what it says."""
+        return self.lines[0]
+
+    @property
+    def names(
+        self,
+    ) -> Annotated[
+        list[str],
+        Meta(description="their names in order of time, those that do not count too", extra={"as": "flights"}),
+    ]:
+        """As the flights' files are called."""
+        return [one.name for one in self.flights]
+
+    @property
+    def usable(self) -> list[Flight]:
+        """The flights that count."""
+        return [one for one in self.flights if not one.excluded]
+
+
+# --- the tracker ------------------------------------------------------------------------------------------------------
 
 TRACKED = tuple(name for name in faults.NAMES if name != "k7")  # an angle wears nothing
 COMPONENTS = len(faults.NAMES)
@@ -234,3 +342,234 @@ def _smoothed(common: Array) -> Array:
 def _mixed(weight: Array, mean: Array, variance: Array) -> tuple[float, float]:
     middle = float(weight @ mean)
     return middle, float(np.sqrt(max(float(weight @ (variance + (mean - middle) ** 2)), 0.0)))
+
+
+# --- what was known after each flight, and what came then -------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Came:
+    """What came after a flight."""
+
+    crossed: int | None  # flights later, in which the level of k had reached its threshold; None: not so far
+    seen: int  # flights since
+
+
+@dataclass(frozen=True, eq=False)
+class HistoryParts:
+    """Of which a history is made: where it is stored, they stand for it."""
+
+    thresholds: dict[str, float]
+    seed: int
+    flights: list[Flight]
+    looks: dict[int, Tracked]  # without their flights, which are the first of these
+
+    def made(self) -> History:
+        """The history; InputError for looks that are not of its flights."""
+        made = History(self.thresholds, self.seed)
+        if not {*self.looks} <= {*range(1, len(self.flights) + 1)}:
+            raise InputError("a history's looks are not of its flights")
+        made.flights, made._tracker = self.flights, None
+        made.looks = {count: replace(one, flights=tuple(self.flights[:count])) for count, one in self.looks.items()}
+        return made
+
+
+class History:
+    """The looks of a `Tracker`, flight after flight; flights that arrive at the end cost their own looks alone."""
+
+    def __init__(self, thresholds: Mapping[str, float] | None = None, seed: int = 0) -> None:
+        """InputError as `Tracker`."""
+        self.thresholds, self._seed = dict(thresholds or {}), seed
+        self.looks: dict[int, Tracked] = {}  # by how many flights there were
+        self.flights: list[Flight] = []  # in order of time
+        self._tracker: Tracker | None = Tracker(self.thresholds, seed)
+
+    def made_of(self) -> HistoryParts:
+        """As `ema_model.result` stores it."""
+        bare = {count: replace(one, flights=()) for count, one in self.looks.items()}
+        return HistoryParts(self.thresholds, self._seed, self.flights, bare)
+
+    def follow(self, flights: Sequence[Flight]) -> Iterator[int]:
+        """Looks after each flight, all in order of time; yields how many are done.
+
+        What was taken before is looked at anew only where it is not how these begin.  InputError as `Tracker.add`.
+        """
+        if [*map(id, self.flights)] != [*map(id, flights[: len(self.flights)])]:
+            self.looks, self.flights, self._tracker = {}, [], Tracker(self.thresholds, self._seed)
+        if self._tracker is None:  # it was stored
+            self._tracker = Tracker(self.thresholds, self._seed)
+            for one in self.flights:
+                self._tracker.add(one)
+        usable = sum(not one.excluded for one in self.flights)
+        for one in flights[len(self.flights) :]:
+            self._tracker.add(one)
+            self.flights.append(one)
+            usable += not one.excluded
+            if usable >= LEAST_FLIGHTS:
+                self.looks[len(self.flights)] = self._tracker.look()
+            yield len(self.flights)
+
+    def copy(self) -> History:
+        """As it is now; what follows changes this one alone."""
+        other = copy(self)
+        other.looks, other.flights = dict(self.looks), list(self.flights)
+        return other
+
+    @property
+    def last(self) -> Tracked | None:
+        """After all of them; None before there are enough."""
+        return self.looks.get(len(self.flights))
+
+    def crossed(self, name: str) -> int | None:
+        """The number of the flight after which the level of a k had first reached its threshold."""
+        threshold = self.thresholds.get(name)
+        if threshold is None:
+            return None
+        sign = 1.0 if threshold > faults.BY_NAME[name].healthy else -1.0
+        passed = (n for n, look in self.looks.items() if sign * (look.faults[name].level - threshold) >= 0.0)
+        return next(passed, None)
+
+    def came(self, number: int, name: str) -> Came:
+        """What came after so many flights; a part that is replaced ends nothing."""
+        crossed = self.crossed(name)
+        later = None if crossed is None or crossed < number else crossed - number
+        return Came(later, len(self.flights) - number)
+
+
+# --- in words: one sentence first, then a table, jumps, what was left out ---------------------------------------------
+
+_MOST_NAMED = 5
+_TRADES = 0.5  # correlation from which on two k are said to trade
+
+
+def answer(result: Tracked) -> str:
+    """The short one."""
+    drifting = [one for one in result.faults.values() if one.trend]
+    if not result.trusted:
+        return "the model does not fit the last flights: no trend is trusted"
+    if not drifting:
+        return "no trend; remaining life not defined"
+    return "; ".join(_sentence(one) for one in drifting)
+
+
+def headline(result: Tracked) -> str:
+    """The same to stand above all else; the name of a k stays small."""
+    told = answer(result)
+    return told if told[:2] in faults.BY_NAME else told[:1].upper() + told[1:]
+
+
+def document_of(result: Tracked) -> Document:
+    """All that the terminal and a notebook show."""
+    usable = len(result.usable)
+    counted = f"{len(result.flights)} flights, {usable} of them usable"
+    blocks = [
+        Lines([answer(result), counted]),
+        *(Note(warning) for warning in result.warnings),
+        _table(result),
+    ]
+    if ahead := _ahead(result):
+        blocks.append(ahead)
+    if lines := [*_jumps(result), *_trades(result), *_excluded(result)]:
+        blocks.append(Lines(lines))
+    return Document(blocks)
+
+
+def hindsight(then: FaultTrack, came: Came) -> str:
+    """What came of what was said of one k: whether it lay within the 90 % interval."""
+    if then.threshold is None or not came.seen:
+        return ""
+    reached = f"{_called(then.name)} reached {then.threshold:g}"
+    left = then.remaining_flights
+    if came.crossed is None:
+        since = "1 flight" if came.seen == 1 else f"{came.seen} flights"
+        late = left is not None and came.seen > left.p95
+        told = f", which is longer than the 90 % interval ({_flights(left.p95)})" if left and late else ""
+        return f"what came: not so far, {since} later{told}"
+    when = f"{came.crossed} flights later" if came.crossed != 1 else "1 flight later"
+    if left is None:
+        return f"what came: {reached}, {when}"
+    inside = left.p05 - 0.5 <= came.crossed <= left.p95 + 0.5  # whole flights are counted
+    side = "within" if inside else ("before" if came.crossed < left.p05 else "after")
+    return f"what came: {reached}, {when}, {side} the 90 % interval"
+
+
+def _sentence(one: FaultTrack) -> str:
+    name = _called(one.name)
+    told = f"{name} drifts by {number(one.drift)} a flight ({_interval(one.drift_interval90)})"
+    if one.remaining_flights is None:
+        return f"{told}: {one.reason}"
+    left = one.remaining_flights
+    if left.p95 < 0.5:
+        return f"{told} and has reached {one.threshold:g}"
+    return (
+        f"{told} and reaches {one.threshold:g} in about {_flights(left.p50)} flights "
+        f"(90 %: {_flights(left.p05)} … {_flights(left.p95)})"
+    )
+
+
+def _table(result: Tracked) -> Table:
+    rows, remarks = [], []
+    for one in result.faults.values():
+        left = one.remaining_flights
+        span = f"{_flights(left.p05)} … {_flights(left.p50)} … {_flights(left.p95)}" if left else "–"
+        drift = f"{number(one.drift)}" if one.trend else "–"
+        threshold = "–" if one.threshold is None else f"{one.threshold:g}"
+        rows.append([_called(one.name), f"{one.level:.4f}", _interval(one.level_interval90), drift, threshold, span])
+        remarks.append(
+            one.reason or "" if not one.trend or one.threshold is not None else "a trend; no threshold was given"
+        )
+    return Table(("level", "90 % interval", "a flight", "threshold", "flights left 5, 50, 95 %"), rows, remarks=remarks)
+
+
+def _ahead(result: Tracked) -> Table | None:
+    rows = [
+        [_called(one.name), *(_chance(soon.probability) for soon in one.crossing_probability)]
+        for one in result.faults.values()
+        if one.remaining_flights
+    ]
+    return Table([str(n) for n in AHEAD], rows, "crosses within the next flights, probability") if rows else None
+
+
+def _jumps(result: Tracked) -> list[str]:
+    return [
+        f"{_called(one.name)} jumped from {jump.before:.3f} to {jump.after:.3f} before {jump.flight}"
+        f"{', as after a part was replaced' if jump.replaced else ''}: it is judged anew from there"
+        for one in result.faults.values()
+        for jump in one.jumps
+    ]
+
+
+def _trades(result: Tracked) -> list[str]:
+    found = []
+    places = [i for i in range(len(faults.NAMES)) if i not in ECCENTRICITY]  # its direction has no name of its own
+    for i, j in combinations(places, 2):
+        share = result.correlation[i, j]
+        if abs(share) > _TRADES:
+            found.append(f"{faults.NAMES[i]} and {faults.NAMES[j]} ({share:+.2f})")
+    return [f"errors of one flight trade between {', '.join(found)}"] if found else []
+
+
+def _excluded(result: Tracked) -> list[str]:
+    left_out = [one for one in result.flights if one.excluded]
+    lines = []
+    for reason, count in Counter(one.excluded for one in left_out).items():
+        names = [one.name for one in left_out if one.excluded == reason]
+        more = f" and {count - _MOST_NAMED} more" if count > _MOST_NAMED else ""
+        lines.append(f"left out: {', '.join(names[:_MOST_NAMED])}{more} ({reason})")
+    return lines
+
+
+def _called(name: str) -> str:
+    return f"{name} {in_sentence(faults.BY_NAME[name].title)}"
+
+
+def _interval(ends: tuple[float, float]) -> str:
+    return f"{number(ends[0])} … {number(ends[1])}"
+
+
+def _flights(count: float) -> str:
+    return f"{count:.0f}" if count < 1e4 else "over 10000"
+
+
+def _chance(p: float) -> str:
+    return f"{p:.3f}" if p >= 5e-4 else "< 0.001"

@@ -16,7 +16,7 @@ from typing import Generic, NamedTuple, TypeVar
 
 from ema_model.errors import InputError, did_you_mean, quoted
 from ema_model.files.opened import check_user_file, shown
-from ema_model.members import stated, stated_in
+from ema_model.members import stated, stated_by_class, stated_in
 
 # --- the files that a command reads and writes: declared with its options, checked all together before it begins ------
 # An option's `type` declares it: an `Input` for what is read, an `Output` for what is written.
@@ -251,9 +251,9 @@ def whole(low: int, high: int) -> Number:
 @cache
 def command_names() -> tuple[str, ...]:
     """As `ema_model.commands.COMMANDS` has them, in its order."""
-    names, places = stated("ema_model.commands", "name"), stated("ema_model.commands", "place")
-    del names["recorded"]  # which is made from a file
-    return tuple(names[file] for file in sorted(names, key=lambda file: (places.get(file, _LAST), names[file])))
+    names, places = stated_by_class("ema_model.commands", "name"), stated_by_class("ema_model.commands", "place")
+    del names["Recorded"]  # which is made from a file
+    return tuple(names[one] for one in sorted(names, key=lambda one: (places.get(one, _LAST), names[one])))
 
 
 @dataclass(frozen=True)
@@ -322,7 +322,7 @@ def add_outputs(parser: argparse.ArgumentParser, what: str) -> None:
 
 
 def add_units(parser: argparse.ArgumentParser) -> None:
-    """--by and --unit; `by_unit` takes what they give."""
+    """--by and --unit; `flow` takes what they give."""
     parser.add_argument(
         "--by",
         metavar="unit|COLUMN",
@@ -403,7 +403,7 @@ def _with_effect(text: str) -> str:
 
 def effect_name(text: str) -> str:
     """The type of an argument that names an effect: of the library, or of the user's own kinds."""
-    kinds = stated_in("ema_model.effects.user.entries", "TITLES")
+    kinds = stated_in("ema_model.effects.user.torque", "TITLES")
     known = [*stated("ema_model.effects", "EFFECT"), *kinds]
     # A model may hold an effect several times: cogging_torque_2.
     if not (

@@ -13,8 +13,7 @@ from ema_model.actuator.parameters import on_axes
 from ema_model.comparison.regions import Region
 from ema_model.comparison.result import Comparison
 from ema_model.faults import NAMES
-from ema_model.quantities.axes import ROTARY, Axes, of_signal
-from ema_model.quantities.numbers import number
+from ema_model.quantities import ROTARY, Axes, number, of_signal
 from ema_model.recordings import Measurement
 from emaviz.colours import ALGORITHMS, CASES, REFERENCE_SHADES
 from emaviz.figures import theme

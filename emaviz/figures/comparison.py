@@ -9,15 +9,13 @@ import plotly.graph_objects as go
 from numpy.typing import NDArray
 from plotly.subplots import make_subplots
 
+from ema_model import quantities
 from ema_model.comparison.regions import Region
 from ema_model.comparison.result import Comparison
 from ema_model.errors import InputError
 from ema_model.estimation.floor import BAND_SIGMAS
-from ema_model.quantities import variables
-from ema_model.quantities.axes import ROTARY, Axes, of_signal
-from ema_model.quantities.axes import of_residual as residual_of_signal
-from ema_model.quantities.numbers import Quantity
-from ema_model.quantities.variables import MODULATORS, variable_title
+from ema_model.quantities import MODULATORS, ROTARY, Axes, Quantity, of_signal, variable_title
+from ema_model.quantities import of_residual as residual_of_signal
 from ema_model.recordings import SIGNALS, ColumnMapping, Measurement, apply_mapping
 from emaviz.colours import BACKWARD, COMMAND, DIFFERENCE, FORWARD, MONITOR, REFERENCE, SLATE
 from emaviz.figures import theme
@@ -713,10 +711,10 @@ def of_residual(comparison: Comparison, name: str, *, as_torque: bool = False) -
 
 def of_variable(comparison: Comparison, variable: str) -> Quantity:
     """A variable that residuals are held against; an angle of the motor in degrees."""
-    return variables.of_variable(variable, comparison.actuator.axes)
+    return quantities.of_variable(variable, comparison.actuator.axes)
 
 
 def wrapped(comparison: Comparison, variable: str) -> np.ndarray:
     """A variable's values (blocks,) in SI units; a rotary motor's angle within one turn."""
     values = comparison.residuals.variables[variable]
-    return np.mod(values, 2.0 * np.pi) if variables.is_turn(variable, comparison.actuator.axes) else values
+    return np.mod(values, 2.0 * np.pi) if quantities.is_turn(variable, comparison.actuator.axes) else values

@@ -16,24 +16,13 @@ from ema_model.actuator.actuator import between, sentences
 from ema_model.faults import FAULTS, HEALTHY, NAMES
 from ema_model.identification.run import ROBUST, algorithm_title
 from ema_model.identification.search import Landscape, Objective
-from ema_model.quantities.axes import Axes
-from ema_model.quantities.numbers import number
+from ema_model.quantities import Axes, number
 from ema_model.recordings import Measurement
 from emaviz.colours import ALGORITHMS, COMMAND, DIFFERENCE, FAULT, MONITOR, REFERENCE, TRUTH
 from emaviz.colours import MONITOR_SHADES as SHADES
 from emaviz.figures import theme
 from emaviz.figures.lines import Lines, LiveLines
-from emaviz.figures.runs import (
-    AXIS,
-    CURSOR,
-    LAST_MORE_PX,
-    PADDING,
-    PLANT_LINE,
-    charts,
-    legend,
-    time_axis,
-    value_axis,
-)
+from emaviz.figures.runs import AXIS, CURSOR, LAST_MORE_PX, PADDING, PLANT_LINE, charts, legend, time_axis, value_axis
 from emaviz.figures.theme import line
 from emaviz.text.html import Html, add_html, html, html_escape, joined, unescaped
 

@@ -11,8 +11,7 @@ from typing import BinaryIO
 
 import pyarrow as pa
 
-from ema_model.recordings.formats.channels import Log, NoLog, broken_file
-from ema_model.recordings.formats.logs import log_format
+from ema_model.recordings.formats.channels import Log, NoLog, broken_file, log_format
 
 # --- whether an MCAP file's chunks unpack to what they declare, by the specification (mcap.dev/spec) ------------------
 # Rerun's reader never ends on some chunks that do not; so each is unpacked here first, and its checksum compared.
@@ -85,7 +84,7 @@ def opened(path: str, most_bytes: int) -> Iterator[Log]:
     """The numbers of all topics; NoLog for what rerun cannot read."""
     from rerun.chunk import McapReader
 
-    from emaviz.formats.chunks import Chunks
+    from emaviz.formats.rrd import Chunks
 
     with open(path, "rb") as file:
         check(file, most_bytes)

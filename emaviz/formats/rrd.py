@@ -2,12 +2,127 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from typing import Any
 
-from ema_model.recordings.formats.channels import Log, NoLog, broken_file
-from ema_model.recordings.formats.logs import log_format
+import numpy as np
+import pyarrow as pa
+import pyarrow.compute
+
+from ema_model.recordings.formats.channels import Channel, Log, NoLog, broken_file, log_format
+from ema_model.recordings.formats.json import decoded, numbers_of_records
+
+# --- Rerun's chunks as channels: each entity's numbers, on its timeline, whatever message they came from --------------
+
+pc: Any = pyarrow.compute  # its functions are made when it is imported
+_NAMES = "SeriesLines:names"
+_RAW = "McapMessage:data"
+_LEFT_OUT = ("McapChannel:", "McapSchema:", "McapStatistics:", "RecordingInfo:", "SeriesLines:", "CoordinateFrame:")
+_MOST_WIDE = 64  # numbers of one sample of an array
+
+
+class Chunks:
+    """Collects the chunks of a file, entity by entity; a timeline of theirs is the entity's clock."""
+
+    def __init__(self, timelines: Sequence[str], most_bytes: int) -> None:
+        self._timelines, self._most_bytes, self._bytes = timelines, most_bytes, 0
+        self._parts: dict[tuple[str, str, str], list[tuple[pa.Array, pa.Array]]] = {}
+        self._names: dict[str, list[str]] = {}
+
+    def take(self, stream: Iterable[Any]) -> None:
+        """Takes all chunks of a stream."""
+        for chunk in stream:
+            batch = chunk.to_record_batch()
+            self._bytes += batch.nbytes
+            if self._bytes > 3 * self._most_bytes:
+                raise NoLog("it unpacks to more than a measurement may take")
+            entity = str(chunk.entity_path)
+            columns = dict(zip(batch.schema.names, batch.columns))
+            if _NAMES in columns and entity not in self._names:
+                self._names[entity] = [str(name) for name in columns[_NAMES][0].as_py() or ()]
+            times = [field.name for field in batch.schema if _is_time(field.type)]
+            timeline = next((name for name in self._timelines if name in times), next(iter(times), ""))
+            if chunk.is_static or entity.startswith("/__") or not timeline:
+                continue
+            for name, values in columns.items():
+                if ":" in name and not name.startswith(_LEFT_OUT) and pa.types.is_list(values.type):
+                    self._parts.setdefault((entity, name, timeline), []).append((columns[timeline], values))
+
+    def has(self, root: str) -> bool:
+        """Whether there are numbers below a root."""
+        return any(entity.startswith(f"/{root}/") for entity, _, _ in self._parts)
+
+    def log(self, notes: Sequence[str] = (), root: str = "") -> Log:
+        """The channels of the entities below `root`."""
+        channels: list[Channel] = []
+        clocks: dict[str, Any] = {}
+        aside: list[str] = []
+        for (entity, name, timeline), parts in self._parts.items():
+            if root and not entity.startswith(f"/{root}/"):
+                continue
+            path = tuple(part for part in entity.removeprefix(f"/{root}" if root else "").split("/") if part)
+            stamps = pa.chunked_array([part[0] for part in parts])
+            lists = pa.chunked_array([part[1] for part in parts]).combine_chunks()
+            lengths = pc.fill_null(pc.list_value_length(lists), 0).to_numpy()
+            if not lengths.size or lengths[0] == 0 or not (lengths == lengths[0]).all():
+                aside.append(".".join(path))
+                continue
+            time = stamps.cast(pa.int64()).to_numpy() * 1e-9
+            clock = f"{entity} {timeline}"
+            clocks[clock] = lambda time=time: time
+            values = lists.flatten()
+            if name == _RAW:
+                found = _json(values, path)
+            else:
+                found = list(_flat(values, path, int(lengths[0]), self._names.get(entity, ())))
+            if not found:
+                aside.append(".".join(path))
+            for inner, numbers in found:
+                holds = numbers.dtype.kind in "iub"
+                channels.append(Channel(inner, numbers.size, lambda n=numbers: n, clock=clock, holds=holds))
+        return Log(channels, clocks, notes=tuple(notes), left_aside=tuple(aside))
+
+
+def _is_time(kind: pa.DataType) -> bool:
+    return pa.types.is_timestamp(kind) or pa.types.is_duration(kind)
+
+
+def _json(values: pa.Array, path: tuple[str, ...]) -> list[tuple[tuple[str, ...], np.ndarray]]:
+    """What JSON messages hold, a record each."""
+    texts = [one.values.to_numpy().tobytes() for one in values]
+    try:
+        records = decoded(b"[" + b",".join(texts) + b"]")
+    except (ValueError, RecursionError):
+        return []
+    return [((*path, *inner), numbers) for inner, numbers in numbers_of_records(records)]
+
+
+def _flat(
+    values: pa.Array, path: tuple[str, ...], width: int, names: Sequence[str]
+) -> Iterator[tuple[tuple[str, ...], np.ndarray]]:
+    """Numbers, structs of them and lists of one length, `width` of them a sample."""
+    kind = values.type
+    if pa.types.is_struct(kind):
+        for field in kind:
+            yield from _flat(pc.struct_field(values, [field.name]), (*path, field.name), width, ())
+    elif pa.types.is_list(kind) or pa.types.is_fixed_size_list(kind):
+        lengths = pc.fill_null(pc.list_value_length(values), 0).to_numpy()
+        if lengths.size and 0 < lengths[0] * width <= _MOST_WIDE and (lengths == lengths[0]).all():
+            yield from _flat(pc.list_flatten(values), path, width * int(lengths[0]), ())
+    elif pa.types.is_integer(kind) or pa.types.is_floating(kind) or pa.types.is_boolean(kind):
+        if values.null_count or width > _MOST_WIDE:
+            return
+        numbers = values.cast(pa.int8()).to_numpy() if pa.types.is_boolean(kind) else values.to_numpy()
+        if width == 1:
+            yield path, numbers
+            return
+        for i in range(width):
+            own = names[i] if len(names) == width else f"{i}"
+            yield (*path[:-1], f"{path[-1]}.{own}" if path else own), numbers[i::width]
+
+
+# --- files of the Rerun viewer ----------------------------------------------------------------------------------------
 
 _GROUPS = ("measurement", "reference", "monitor")  # of emaviz's own: the first that there is, is the recording
 _TIMELINES = ("sim_time", "sensor_time", "time", "timestamp", "log_time")
@@ -16,7 +131,6 @@ _TIMELINES = ("sim_time", "sensor_time", "time", "timestamp", "log_time")
 @contextmanager
 def opened(path: str, most_bytes: int) -> Iterator[Log]:
     """The numbers of all entities; NoLog for what rerun cannot read."""
-    from emaviz.formats.chunks import Chunks
 
     with broken_file():
         chunks = Chunks(_TIMELINES, most_bytes)

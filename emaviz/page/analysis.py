@@ -14,7 +14,7 @@ import viser
 
 from ema_model.actuator import Actuator
 from ema_model.analyses import analyses
-from ema_model.quantities.titles import in_sentence
+from ema_model.quantities import in_sentence
 from ema_model.recordings.measurement import Measurement
 from ema_model.result import Result
 from ema_model.text import Document, Lines

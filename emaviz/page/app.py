@@ -18,15 +18,12 @@ from ema_model.actuator import load_actuator
 from ema_model.members import classes_in, members
 from ema_model.simulation import plant
 from emaviz.page import compare, explore
-from emaviz.page.charts import add_chart_tools
-from emaviz.page.correction import Correction
-from emaviz.page.explore.tab import ExploreTab
-from emaviz.page.job_bar import JobBar
-from emaviz.page.measure import Measuring, add_measuring
-from emaviz.page.panel import follow_theme
+from emaviz.page.charts import Measuring, add_chart_tools, add_measuring
+from emaviz.page.explore import ExploreTab
+from emaviz.page.panel import JobBar, follow_theme
 from emaviz.page.playback import PlaybackStrip
 from emaviz.page.share import Sharing
-from emaviz.page.tab import AnyTab, Shared, Standings, Tab
+from emaviz.page.tab import AnyTab, Correction, Shared, Standings, Tab
 from emaviz.page.window_layout import LEFT_PX, Docked
 from emaviz.page.workspaces import Page, Workspace, Workspaces
 from emaviz.recording.viewer import ViewerHost
@@ -38,21 +35,18 @@ from emaviz.server.viser_private import Inside
 from emaviz.session.campaigns import Campaigns
 from emaviz.session.compare import Comparing
 from emaviz.session.data_folder import DataFolder
-from emaviz.session.discover.discovering import Discovering
+from emaviz.session.discovering import Discovering
 from emaviz.session.explore import Session
 from emaviz.session.jobs import Worker, report
 
-# --- finds the tabs: every file here that states a `WORKSPACE` and defines its tab, or folder whose `tab.py` does -----
+# --- finds the tabs: every file here that states a `WORKSPACE` and defines its tab ------------------------------------
 
 
 def tabs() -> list[type[Tab]]:
     """In their order."""
     found: list[type[Tab]] = []
-    for name in members("emaviz.page", "WORKSPACE", files=True, folders=True):
-        module = importlib.import_module(f"emaviz.page.{name}")
-        if hasattr(module, "__path__"):
-            module = importlib.import_module(f"emaviz.page.{name}.tab")
-        found += classes_in(module, Tab)
+    for name in members("emaviz.page", "WORKSPACE"):
+        found += classes_in(importlib.import_module(f"emaviz.page.{name}"), Tab)
     return sorted(found, key=lambda one: one.workspace.place)
 
 

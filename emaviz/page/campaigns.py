@@ -10,11 +10,10 @@ from urllib.parse import quote
 import plotly.graph_objects as go
 import viser
 
-from ema_model.campaign.result import Campaign
-from ema_model.campaign.store import Store, summaries
+from ema_model.campaign.store import Campaign, Store, summaries
 from ema_model.discovery.result import effect_title
 from ema_model.errors import InputError
-from ema_model.quantities.variables import NOTHING, explanation_title
+from ema_model.quantities import NOTHING, explanation_title
 from ema_model.recordings import Measurement
 from emaviz.figures.campaign import counted
 from emaviz.page.panel import JobLine
@@ -23,8 +22,8 @@ from emaviz.page.tab import Standing
 from emaviz.page.workspaces import Page, Workspace
 from emaviz.server.safe_server import RESULTS
 from emaviz.session.campaigns import REPORT, Campaigns, Computing
-from emaviz.session.inputs import Provenance
 from emaviz.session.jobs import Worker
+from emaviz.session.session_file import Provenance
 from emaviz.text.html import Html, add_html, begin, html, joined, said
 from emaviz.views.campaign import answers, case_in_words, counted_px, errors_drawn, in_words
 

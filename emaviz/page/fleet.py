@@ -9,7 +9,6 @@ import plotly.graph_objects as go
 import viser
 
 from ema_model.fleet.result import UnitsCompared, document_of, lacking, notes, rests_on, sentences
-from emaviz.figures import fleet
 from emaviz.page.panel import REPORT, Example, FolderChoice, JobLine, KeepButtons, Keeps, PracticeButtons, Seal
 from emaviz.page.share import Place
 from emaviz.page.tab import Shared, Standing, Tab
@@ -19,6 +18,7 @@ from emaviz.session.fleet import TYPE, ComparingUnits
 from emaviz.session.session_file import Part
 from emaviz.text.html import BOX, DIM, Html, add_html, begin, html, joined, note, waiting
 from emaviz.text.results import MEANINGS, begun, of_units, warned, whole
+from emaviz.views import fleet
 
 # --- what stays of compared units: the report, and the type as an actuator's file -------------------------------------
 

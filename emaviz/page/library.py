@@ -11,7 +11,7 @@ from ema_model.effects import CATALOGUE, Effect, find
 from ema_model.faults import HEALTHY
 from ema_model.simulation.with_effect import RUNS, WithEffect
 from emaviz.figures.discovery import EffectCharts, picture, small_picture
-from emaviz.page.discover.candidate import about
+from emaviz.page.discover_candidate import about
 from emaviz.page.panel import JobLine
 from emaviz.page.playback import PlaybackStrip
 from emaviz.page.style import LONG_LABELS
@@ -20,7 +20,7 @@ from emaviz.page.window_layout import COLUMNS, NEXT_COLUMN
 from emaviz.page.workspaces import Page, Workspace
 from emaviz.scene.playback import motion
 from emaviz.server.viser_private import selector_of
-from emaviz.session.library import Library
+from emaviz.session.explore import Library
 from emaviz.text.html import BOX, add_html, html, mathml, note, unescaped
 
 # --- an effect opened: its text, its equation, and what each parameter does -------------------------------------------

@@ -16,11 +16,11 @@ import viser
 from ema_model.errors import InputError
 from ema_model.faults import HEALTHY
 from ema_model.recordings import SIGNALS, Measurement
-from emaviz.figures import comparison, overlays, runs
+from emaviz.figures import comparison, runs
 from emaviz.figures.identification import named
 from emaviz.figures.lines import Lines, Window, clipped
 from emaviz.page.campaigns import CampaignControls
-from emaviz.page.measure import marked
+from emaviz.page.charts import marked
 from emaviz.page.panel import Example, recording_link
 from emaviz.page.share import Place, share_line
 from emaviz.page.tab import Shared, Tab
@@ -33,12 +33,10 @@ from emaviz.scene.playback import motion
 from emaviz.session import session_file
 from emaviz.session.compare import Comparing
 from emaviz.session.data_folder import SESSION_SUFFIX
-from emaviz.session.files import UPLOADED
+from emaviz.session.files import UPLOADED, RecordedRuns
 from emaviz.session.jobs import Worker
-from emaviz.session.recorded_runs import RecordedRuns
 from emaviz.session.session_file import Part
-from emaviz.text.html import Html, add_html, begin, boxed, html, joined, said
-from emaviz.text.terms import explained
+from emaviz.text.html import Html, add_html, begin, boxed, explained, html, joined, said
 
 # --- everything on the page as one file: saved to the data folder and to the browser, loaded from either --------------
 
@@ -213,7 +211,7 @@ class RunsResult:
         signal = comparison.signal_at_a_glance(self._shown) if self._shown is not None else None
         if self._shown is None or signal is None:
             return None
-        found = overlays.recorded([("", "", self._shown)], signal)[place]
+        found = runs.recorded([("", "", self._shown)], signal)[place]
         return found if found.lines else None
 
     def _zoom_glance(self, window_s: Window | None) -> None:
@@ -254,7 +252,7 @@ class RunsResult:
         if self._pair is None:
             return None
         (_, first), (_, second) = self._pair
-        found = overlays.recorded([("A", runs.FIRST, first), ("B", runs.SECOND, second)], self._chosen())[place]
+        found = runs.recorded([("A", runs.FIRST, first), ("B", runs.SECOND, second)], self._chosen())[place]
         return found if found.lines else None
 
     def _zoom(self, window_s: Window | None) -> None:

@@ -17,7 +17,7 @@ from emaviz.page.workspaces import Page
 from emaviz.recording.viewer import ViewerHost
 from emaviz.server.safe_server import RESULTS, Kept
 from emaviz.server.viser_private import Inside, id_of
-from emaviz.session.inputs import Provenance
+from emaviz.session.session_file import Provenance
 from emaviz.text.html import Html, add_html, html, joined
 
 Place = Mapping[str, Sequence[str]]  # what a tab shows, by what an address calls it

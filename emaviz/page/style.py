@@ -10,7 +10,7 @@ from collections.abc import Sequence
 
 from emaviz.colours import HELD_OUT, LIMIT, rgb
 from emaviz.figures.theme import DARK, LIGHT
-from emaviz.page import charts, measure, window_layout
+from emaviz.page import charts, window_layout
 from emaviz.text.html import Html, html, unescaped
 
 JOBS = Html('<div class="emaviz-jobs"></div>')  # stands in the panel that becomes the job bar
@@ -97,7 +97,7 @@ def page() -> Html:
         ".emaviz-whole button span:first-child{display:none}"
         "</style>"
     )
-    return rules + _strip() + _jobs() + window_layout.style() + charts.style() + measure.style()
+    return rules + _strip() + _jobs() + window_layout.style() + charts.chart_style() + charts.measure_style()
 
 
 def _strip() -> Html:

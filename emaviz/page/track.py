@@ -11,16 +11,11 @@ import viser
 
 from ema_model.errors import InputError
 from ema_model.faults import BY_NAME
-from ema_model.quantities.titles import in_sentence
+from ema_model.quantities import in_sentence
 from ema_model.text import COLOURS
-from ema_model.tracking.evidence import LEAST_FLIGHTS
 from ema_model.tracking.flights import Flight
-from ema_model.tracking.history import History
-from ema_model.tracking.result import Tracked
-from ema_model.tracking.track import TRACKED
-from ema_model.tracking.words import headline, hindsight
-from emaviz.figures import tracking
-from emaviz.figures.tracking import CLICKED
+from ema_model.tracking.track import TRACKED, History, Tracked, headline, hindsight
+from ema_model.tracking.trends import LEAST_FLIGHTS
 from emaviz.page.compare import WORKSPACE as COMPARE
 from emaviz.page.panel import (
     RECORD,
@@ -48,6 +43,8 @@ from emaviz.session.session_file import Part
 from emaviz.session.track import Following
 from emaviz.text.html import BOX, DIM, Html, add_html, begin, boxed, html, joined, note, waiting
 from emaviz.text.results import warned, whole
+from emaviz.views import tracking
+from emaviz.views.tracking import CLICKED
 
 # --- a click on a flight in its chart ---------------------------------------------------------------------------------
 # A click on a flight in its chart: the page knows which point is hovered, and tells it through an unseen field.

@@ -13,11 +13,10 @@ import viser
 
 from ema_model.errors import InputError
 from emaviz.page import charts, window_layout
-from emaviz.page.charts import ChartHeights
-from emaviz.page.measure import Measuring
+from emaviz.page.charts import ChartHeights, Measuring
 from emaviz.page.style import unseen
 from emaviz.page.window_layout import Docked
-from emaviz.server.field_error import say_beside
+from emaviz.server.access import say_beside
 from emaviz.server.viser_private import Inside, id_of
 from emaviz.session.explore import Session
 from emaviz.session.jobs import Job, Signal, Waiting, Worker

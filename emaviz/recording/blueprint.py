@@ -15,9 +15,9 @@ import rerun_bindings
 from numpy.typing import ArrayLike, NDArray
 
 from ema_model.identification.run import algorithm_title
-from ema_model.quantities.numbers import round_numbers
+from ema_model.quantities import round_numbers
 from emaviz import colours
-from emaviz.recording.style import (
+from emaviz.recording.entry import (
     ANSWER,
     APPLICATION,
     COMPARISON,

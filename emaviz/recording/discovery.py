@@ -30,8 +30,7 @@ from ema_model.text import Block, Lines, Note
 from emaviz import colours
 from emaviz.recording import writer as drawn_as
 from emaviz.recording.blueprint import Contents, arranged, plot, signal_view
-from emaviz.recording.entry import RecordingError, configured
-from emaviz.recording.style import GROUP_COLOURS, ITERATION, plain, series_title
+from emaviz.recording.entry import GROUP_COLOURS, ITERATION, RecordingError, configured, plain, series_title
 from emaviz.recording.writer import RecordingWriter, written
 
 # --- how a discovery's recording opens: Ladder, Candidates, Signals, Residuals, Configuration -------------------------

@@ -12,10 +12,17 @@ from numpy.typing import NDArray
 from ema_model import faults
 from ema_model.actuator.actuator import between, sentences
 from ema_model.commands import Recorded
-from ema_model.identification.run import Identification, Progress, algorithm_title
+from ema_model.identification.run import (
+    Identification,
+    Progress,
+    algorithm_title,
+    facts,
+    in_one_line,
+    verdict,
+    why_best,
+)
 from ema_model.identification.search import Objective
-from ema_model.identification.words import facts, in_one_line, verdict, why_best
-from ema_model.quantities.numbers import amount
+from ema_model.quantities import amount
 from ema_model.recordings import Measurement
 from ema_model.simulation.run import RecordedLoad, Run, simulate_monitor
 from emaviz.recording.writer import RecordingWriter

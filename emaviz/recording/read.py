@@ -23,8 +23,16 @@ from ema_model.child_processes import start_program
 from ema_model.errors import InputError
 from ema_model.files.opened import check_user_file, open_user_file
 from ema_model.files.written import FileLock, lock_path, whole_file
-from emaviz.recording.entry import RecordingError, free_name
-from emaviz.recording.style import APPLICATION, GROUPS, ITERATION, K_NAMES, PROPERTIES, SIM_TIME
+from emaviz.recording.entry import (
+    APPLICATION,
+    GROUPS,
+    ITERATION,
+    K_NAMES,
+    PROPERTIES,
+    SIM_TIME,
+    RecordingError,
+    free_name,
+)
 
 # --- reads a recording back into arrays -------------------------------------------------------------------------------
 

@@ -25,11 +25,10 @@ from ema_model.campaign.thesis import (
 from ema_model.campaign.thesis_words import NAMES, answer, coefficient_table, row_table
 from ema_model.errors import InputError
 from emaviz import colours
-from emaviz.recording import blueprint, style
+from emaviz.recording import blueprint, entry
 from emaviz.recording import writer as drawn_as
 from emaviz.recording.blueprint import Array, Chart, plot
-from emaviz.recording.entry import RecordingError
-from emaviz.recording.style import algorithm_colour, signal_title
+from emaviz.recording.entry import RecordingError, algorithm_colour, signal_title
 from emaviz.recording.writer import RecordingWriter, escaped
 
 ROOT = "/reproduce"
@@ -144,7 +143,7 @@ class ReproductionWriter(RecordingWriter):
             rrb.Tabs(*tabs),
             rrb.BlueprintPanel(state="collapsed"),
             rrb.SelectionPanel(state="collapsed"),
-            rrb.TimePanel(state="collapsed", timeline=style.SIM_TIME, play_state="Paused"),
+            rrb.TimePanel(state="collapsed", timeline=entry.SIM_TIME, play_state="Paused"),
             auto_views=False,
             auto_layout=False,
         )
@@ -174,7 +173,7 @@ def _title(case: str) -> str:
 
 def _time(run: Any) -> list[rr.TimeColumn]:
     nanoseconds = np.rint(np.asarray(run.time_s) * 1e9).astype("timedelta64[ns]")
-    return [rr.TimeColumn(style.SIM_TIME, duration=nanoseconds)]
+    return [rr.TimeColumn(entry.SIM_TIME, duration=nanoseconds)]
 
 
 def _markdown(heads: Sequence[str], lines: Sequence[Sequence[str]]) -> str:

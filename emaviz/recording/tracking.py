@@ -12,12 +12,11 @@ import rerun.blueprint as rrb
 from numpy.typing import ArrayLike
 
 from ema_model.errors import InputError
-from ema_model.quantities.numbers import HALF_90
-from ema_model.tracking.result import Tracked
+from ema_model.quantities import HALF_90
+from ema_model.tracking.track import Tracked
 from emaviz.recording import writer as drawn_as
 from emaviz.recording.blueprint import plot
-from emaviz.recording.entry import RecordingError
-from emaviz.recording.style import GROUP_COLOURS, K_TITLES
+from emaviz.recording.entry import GROUP_COLOURS, K_TITLES, RecordingError
 from emaviz.recording.writer import RecordingWriter, escaped
 
 FLIGHT = "flight"

@@ -23,10 +23,21 @@ from rerun.error_utils import catch_and_log_exceptions
 from ema_model.files.written import whole_file
 from ema_model.identification.run import algorithm_title
 from ema_model.text import Block, Facts, Lines, Note, Remarks
-from emaviz.recording import blueprint, style
+from emaviz.recording import blueprint, entry
 from emaviz.recording.blueprint import Algorithm, Chart, Contents, build, send
-from emaviz.recording.entry import MIN_FREE_BYTES, RecordingError, claim, free_bytes, part_of
-from emaviz.recording.style import ANSWER, APPLICATION, ITERATION, K_NAMES, Colour, algorithm_path
+from emaviz.recording.entry import (
+    ANSWER,
+    APPLICATION,
+    ITERATION,
+    K_NAMES,
+    MIN_FREE_BYTES,
+    Colour,
+    RecordingError,
+    algorithm_path,
+    claim,
+    free_bytes,
+    part_of,
+)
 
 # --- one .rrd file while it is written: its stream, its lock, its failures and its end --------------------------------
 
@@ -229,29 +240,29 @@ Style = rr.SeriesLines | rr.SeriesPoints
 
 def signal_style(group: str, name: str) -> Style:
     """A signal's line: colour of its group, name with unit."""
-    return line(style.series_title(group, name), style.signal_colour(group, name), style.GROUP_WIDTHS[group])
+    return line(entry.series_title(group, name), entry.signal_colour(group, name), entry.GROUP_WIDTHS[group])
 
 
 def monitor_style(index: int) -> Style:
     """The monitor's current on an iteration: the later, the more the monitor's own colour."""
-    return line(f"MM iteration {index} [A]", style.iteration_colour(index), 1.2)
+    return line(f"MM iteration {index} [A]", entry.iteration_colour(index), 1.2)
 
 
 def iteration_style(path: str) -> Style:
     """The style of an entity over iterations, by its place under /identification/<algorithm>/."""
     _, _, algorithm, kind, *rest = path.split("/")
-    colour, title = style.algorithm_colour(algorithm), algorithm_title(algorithm)
+    colour, title = entry.algorithm_colour(algorithm), algorithm_title(algorithm)
     name = rest[0] if rest else ""
     if kind == "population":
         return rr.SeriesPoints(
-            names=f"population {name}", colors=[style.POPULATION_COLOUR], markers="circle", marker_sizes=[1.3]
+            names=f"population {name}", colors=[entry.POPULATION_COLOUR], markers="circle", marker_sizes=[1.3]
         )
     if kind == "interval":
         return rr.SeriesPoints(names=f"90 % interval {name}", colors=[colour], markers="diamond", marker_sizes=[5.0])
     if kind == "best":
         return line(f"{title} best {name} [-]", colour, 2.5)
     if kind == "truth":
-        return line(f"true {name} [-]", style.TRUTH_COLOUR, 2.0)
+        return line(f"true {name} [-]", entry.TRUTH_COLOUR, 2.0)
     # Series of one name share an entry of the legend; the logarithm's plot says in its title what they are.
     which = "corrected" if kind == "corrected_error" else "uncorrected"
     if kind == "log10_rmse":
@@ -357,7 +368,7 @@ def _ragged(rows: list[tuple[int, Array]]) -> tuple[list[rr.TimeColumn], Any]:
 
 _ROWS_PER_CHUNK = 25
 _FLUSH_EVERY_S = 0.25
-_MODEL = style.GROUP_COLOURS["monitor"]
+_MODEL = entry.GROUP_COLOURS["monitor"]
 
 
 class RecordingWriter:
@@ -421,14 +432,14 @@ class RecordingWriter:
         bundle = rr.AnyValues()
         for name, value in values.items():
             bundle.with_component_from_data(str(name), json.dumps(value, default=_for_json))
-        self._file.do(lambda stream: stream.send_property(style.PROPERTIES, bundle))
+        self._file.do(lambda stream: stream.send_property(entry.PROPERTIES, bundle))
 
     def signals(self, group: str, time_s: ArrayLike, signals: Mapping[str, ArrayLike]) -> None:
         """Signals (n,) by canonical name at time_s (n,), of reference, monitor, measurement or residual."""
-        if group not in style.GROUPS:
-            raise ValueError(f"no group {group!r}; groups are {', '.join(style.GROUPS)}")
+        if group not in entry.GROUPS:
+            raise ValueError(f"no group {group!r}; groups are {', '.join(entry.GROUPS)}")
         time, count = _durations(time_s)
-        arrays = {style.plain(name): _column(name, values, count) for name, values in signals.items()}
+        arrays = {entry.plain(name): _column(name, values, count) for name, values in signals.items()}
         with self._file.lock:
             names = self._contents.signals.setdefault(group, [])
             for name, values in arrays.items():
@@ -445,10 +456,10 @@ class RecordingWriter:
 
     def truth(self, k: ArrayLike) -> None:
         """The true k (8,), if known: static values, and a line beside every identified k from now on."""
-        truth = _column("k", k, len(style.K_NAMES))
+        truth = _column("k", k, len(entry.K_NAMES))
         with self._file.lock:
             self._truth, self._contents.truth = truth, True
-            for name, value in zip(style.K_NAMES, truth, strict=True):
+            for name, value in zip(entry.K_NAMES, truth, strict=True):
                 scalar = rr.Scalars(value)
                 self._file.do(lambda stream, n=name, s=scalar: stream.log(f"/truth/{n}", s, static=True))
 
@@ -484,8 +495,8 @@ class RecordingWriter:
         In the plot it takes the place of the uncorrected one, which a static value hides there.
         """
         errors = np.asarray(errors_A, dtype=float)
-        time = [rr.TimeColumn(style.ITERATION, sequence=np.arange(len(errors)))]
-        root = style.algorithm_path(algorithm)
+        time = [rr.TimeColumn(entry.ITERATION, sequence=np.arange(len(errors)))]
+        root = entry.algorithm_path(algorithm)
         with self._file.lock:
             self._file.do(lambda stream: stream.log(f"{root}/log10_rmse", rr.Scalars([]), static=True))
             for kind, values in (("corrected_error", errors), ("log10_corrected_error", log10(errors))):
@@ -497,23 +508,23 @@ class RecordingWriter:
         current = _column("current_A", current_A, count)
         with self._file.lock:
             self._algorithm(algorithm).monitor = True
-            self._send(style.monitor_iteration_path(algorithm, index), monitor_style(index), time, current)
+            self._send(entry.monitor_iteration_path(algorithm, index), monitor_style(index), time, current)
 
     def fit(self, signal: str, time_s: ArrayLike, measured: ArrayLike, algorithms: Sequence[str]) -> None:
         """The measured curve (n,) of a signal that `fit_iteration` draws a model beside, and its axes."""
         chart = Chart.of(signal, time_s, measured)
         drawn = blueprint.measured(chart.strip(time_s, measured))
         with self._file.lock:
-            self._contents.charts[style.plain(signal)] = chart
+            self._contents.charts[entry.plain(signal)] = chart
             self._file.do(lambda stream: chart.log_axes(stream, blueprint.axes_path(signal)))
             for path in [blueprint.fit_path(name, signal, "measured") for name in algorithms]:
                 self._file.do(lambda stream, path=path: stream.log(path, drawn, static=True))
 
     def fit_iteration(self, algorithm: str, index: int, signal: str, time_s: ArrayLike, values: ArrayLike) -> None:
         """The best individual's curve (n,) on this iteration; `fit` has given the signal its axes."""
-        colour = style.algorithm_colour(algorithm)
+        colour = entry.algorithm_colour(algorithm)
         columns = blueprint.model_columns(self._contents.charts[signal].strip(time_s, values), colour)
-        path, time = blueprint.fit_path(algorithm, signal, "model"), [rr.TimeColumn(style.ITERATION, sequence=[index])]
+        path, time = blueprint.fit_path(algorithm, signal, "model"), [rr.TimeColumn(entry.ITERATION, sequence=[index])]
         self._file.do(lambda stream: stream.send_columns(path, time, columns))
 
     def curve(self, signal: str, which: str, time_s: ArrayLike, values: ArrayLike) -> None:
@@ -521,7 +532,7 @@ class RecordingWriter:
         with self._file.lock:
             chart = self._contents.curves.get(signal)
             if chart is None:
-                chart = self._contents.curves[style.plain(signal)] = Chart.of(signal, time_s, values)
+                chart = self._contents.curves[entry.plain(signal)] = Chart.of(signal, time_s, values)
                 self._file.do(lambda stream: chart.log_axes(stream, f"{blueprint.CURVES}/{signal}"))
             points = chart.strip(time_s, values)
             drawn = blueprint.measured(points) if which == "measured" else blueprint.model(points, _MODEL)
@@ -531,21 +542,21 @@ class RecordingWriter:
         """The answer in words, on the dashboard."""
         with self._file.lock:
             self._contents.answer = True
-            self._text(style.ANSWER, markdown)
+            self._text(entry.ANSWER, markdown)
 
     def finding(self, name: str, markdown: str) -> None:
         """What a comparison found, in words: a document at /comparison/NAME, shown where it fails."""
         with self._file.lock:
-            if style.plain(name) not in self._contents.findings:
+            if entry.plain(name) not in self._contents.findings:
                 self._contents.findings.append(name)
-            self._text(f"{style.COMPARISON}/{name}", markdown)
+            self._text(f"{entry.COMPARISON}/{name}", markdown)
 
     def interval(self, algorithm: str, index: int, ends: ArrayLike) -> None:
         """The interval (8, 2) of each k at the last iteration."""
         ends = np.asarray(ends, dtype=float)
-        time = [rr.TimeColumn(style.ITERATION, sequence=[index])]
-        for row, k in enumerate(style.K_NAMES):
-            path = f"{style.algorithm_path(algorithm)}/interval/{k}"
+        time = [rr.TimeColumn(entry.ITERATION, sequence=[index])]
+        for row, k in enumerate(entry.K_NAMES):
+            path = f"{entry.algorithm_path(algorithm)}/interval/{k}"
             columns = rr.Scalars.columns(scalars=ends[row]).partition([2])
             self._send_columns(path, iteration_style(path), time, columns)
 
@@ -557,7 +568,7 @@ class RecordingWriter:
                 raise ValueError("a result needs its algorithm's name when no iteration came before it")
             self._algorithm(algorithm).result = True
             self._text(
-                f"{style.algorithm_path(algorithm)}/result",
+                f"{entry.algorithm_path(algorithm)}/result",
                 table(f"Result of {algorithm_title(algorithm)}", values),
             )
 
@@ -617,7 +628,7 @@ class RecordingWriter:
                 self._send_columns(path, iteration_style(path), time, columns)
 
     def _algorithm(self, name: str) -> Algorithm:
-        return self._contents.algorithms.setdefault(style.plain(name), Algorithm())
+        return self._contents.algorithms.setdefault(entry.plain(name), Algorithm())
 
     def _text(self, path: str, markdown: str) -> None:
         document = rr.TextDocument(markdown, media_type=rr.MediaType.MARKDOWN)
@@ -641,7 +652,7 @@ def _durations(time_s: ArrayLike) -> tuple[list[rr.TimeColumn], int]:
     if seconds.ndim != 1 or not np.isfinite(seconds).all():
         raise ValueError(f"times must be finite and of the shape (n,), not {seconds.shape}")
     nanoseconds = np.rint(seconds * 1e9).astype("timedelta64[ns]")
-    return [rr.TimeColumn(style.SIM_TIME, duration=nanoseconds)], len(seconds)
+    return [rr.TimeColumn(entry.SIM_TIME, duration=nanoseconds)], len(seconds)
 
 
 def _column(name: str, values: ArrayLike, count: int) -> NDArray[np.float64]:

@@ -11,13 +11,13 @@ import viser
 from numpy.typing import ArrayLike, NDArray
 
 from ema_model.actuator import Actuator
-from ema_model.quantities.numbers import amount
-from emaviz.scene.framing import FIELD_RAD, Frame, frame
+from ema_model.quantities import amount
 from emaviz.scene.labels import Callout, Label, Labels
 from emaviz.scene.solids import (
     AT_REST,
     DARK,
     FAULT,
+    FIELD_RAD,
     GLASS,
     IRON,
     LIGHT,
@@ -28,6 +28,7 @@ from emaviz.scene.solids import (
     TURN,
     WHITE,
     Colour,
+    Frame,
     Solid,
     about_x,
     about_y,
@@ -36,6 +37,7 @@ from emaviz.scene.solids import (
     between,
     block,
     extruded,
+    frame,
     gear_wheel,
     joined,
     revolved,

@@ -15,8 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 from ema_model.actuator import Actuator
 from ema_model.actuator.actuator import sentences
 from ema_model.faults import FAULTS
-from emaviz.scene.framing import BOXES, Frame, frame
-from emaviz.scene.solids import FAULT, SATIN
+from emaviz.scene.solids import BOXES, FAULT, SATIN, Frame, frame
 
 # --- what differs from healthy, said in physical units at its place on the machine ------------------------------------
 

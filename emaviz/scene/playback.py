@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ema_model.actuator import Actuator
 from ema_model.faults import physical
-from ema_model.quantities.sides import USER
+from ema_model.quantities import USER
 from ema_model.recordings import Measurement
 from emaviz.scene.actuator import ARM, ActuatorScene, Machine, said
 from emaviz.scene.labels import Callout, callouts

@@ -26,8 +26,7 @@ from websockets.datastructures import Headers
 from websockets.http11 import Request, Response
 
 from ema_model.errors import InputError
-from emaviz.server.access import Complaints, Door, Gate, protect
-from emaviz.server.messages import LARGEST_FRAME
+from emaviz.server.access import LARGEST_FRAME, Complaints, Door, Gate, protect
 from emaviz.server.viser_private import keep_icons
 
 SCENES = "/scenes/"  # below which the actuator's saved scenes are served

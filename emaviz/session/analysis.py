@@ -16,14 +16,14 @@ import msgspec
 from ema_model.actuator import Actuator, load_actuator
 from ema_model.analyses import Analysis
 from ema_model.errors import InputError
-from ema_model.quantities.titles import in_sentence
+from ema_model.quantities import in_sentence
 from ema_model.recordings import write_measurement
 from ema_model.recordings.measurement import Measurement
 from ema_model.result import Result
 from emaviz.session.compare import Comparing
 from emaviz.session.files import Opened, all_measured
-from emaviz.session.inputs import Inputs, Provenance
 from emaviz.session.jobs import Job, Run, Signal, Worker, aside
+from emaviz.session.session_file import Inputs, Provenance
 from emaviz.session.settings import taken
 
 

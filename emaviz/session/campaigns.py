@@ -16,12 +16,9 @@ import msgspec
 from ema_model.actuator import load_actuator
 from ema_model.campaign.kinds import KINDS
 from ema_model.campaign.plan import Plan, load_plan, shipped_plans
-from ema_model.campaign.plan_axes import TaskInputs, inputs_of
-from ema_model.campaign.result import Campaign
-from ema_model.campaign.run import Status, duration, estimate_s, run_plan
-from ema_model.campaign.schedulers import scheduler
-from ema_model.campaign.store import Packed, Store
-from ema_model.campaign.task import Task
+from ema_model.campaign.run import Status, duration, estimate_s, run_plan, scheduler
+from ema_model.campaign.store import Campaign, Packed, Store
+from ema_model.campaign.task import Task, TaskInputs, inputs_of
 from ema_model.comparison import compare
 from ema_model.discovery import discover
 from ema_model.errors import InputError
@@ -32,8 +29,8 @@ from ema_model.recordings import Measurement
 from ema_model.result import Result, restored, stored
 from emaviz.session.data_folder import DataFolder
 from emaviz.session.explore import Session
-from emaviz.session.inputs import Inputs, Room, digest
 from emaviz.session.jobs import Job, Run, Signal, Steps, Stopped, Tell, elsewhere
+from emaviz.session.session_file import Inputs, Room, digest
 from emaviz.session.settings import taken
 
 _HEADER = "campaign.json"

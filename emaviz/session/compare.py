@@ -17,7 +17,7 @@ from ema_model.challenges import challenges
 from ema_model.comparison.result import Comparison
 from ema_model.errors import InputError, quoted
 from ema_model.files.opened import refusal, shown
-from ema_model.quantities.titles import in_sentence
+from ema_model.quantities import in_sentence
 from ema_model.recordings import SIGNALS, ColumnMapping, Measurement, change_side_file, prepared, read
 from ema_model.recordings.formats.text_layout import Hints
 from ema_model.recordings.side_file import SideFile
@@ -25,8 +25,8 @@ from emaviz.session import files
 from emaviz.session.data_folder import DataFolder
 from emaviz.session.explore import Session
 from emaviz.session.files import Opened, all_measured, guesses, measured, read_opened, side_file_of, side_with
-from emaviz.session.inputs import Inputs, Provenance, Whole, digest, listed, version_of, version_with_side
 from emaviz.session.jobs import Job, Signal, Tell, Worker, report
+from emaviz.session.session_file import Inputs, Provenance, Whole, digest, listed, version_of, version_with_side
 from emaviz.session.settings import number
 
 # --- what the screen listens to of Compare ----------------------------------------------------------------------------

@@ -20,7 +20,7 @@ from ema_model.errors import InputError
 from ema_model.files.opened import check_user_file, shown
 from ema_model.files.written import FileLock, new_draft, remove_abandoned, whole_file
 from ema_model.recordings import side_path
-from ema_model.recordings.formats import FORMATS, robot_dataset
+from ema_model.recordings.formats import FORMATS, parquet
 
 ACTUATOR_SUFFIX = ".toml"
 SESSION_SUFFIX = ".emaviz"
@@ -269,7 +269,7 @@ def _walked(folder: Path) -> Iterator[tuple[Path, list[str]]]:
 
 def _episodes(folder: Path) -> list[Path]:
     """The files of a robot's dataset, where the folder is one."""
-    return [Path(file) for file in robot_dataset.files_in(str(folder))]
+    return [Path(file) for file in parquet.files_in(str(folder))]
 
 
 def sanitised(filename: str) -> str:

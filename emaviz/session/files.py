@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+import os
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
+from datetime import datetime
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,21 +16,27 @@ from ema_model.actuator import Actuator, load_actuator, save_actuator
 from ema_model.actuator.describe import DRIVES, asked, described, entry_of, gear_of, implausible, missing, unanswered
 from ema_model.actuator.parameters import facts_of, on_axes
 from ema_model.actuator.reference import usual_tolerance
+from ema_model.analyses import analyses
 from ema_model.challenges import Challenge
+from ema_model.discovery.words import effect_title
 from ema_model.errors import InputError, quoted
 from ema_model.files.opened import PAGE_BYTES, shipped_folder, shown
-from ema_model.practice import challenge_in, make, reveal, shipped
-from ema_model.practice.kinds.kind import Revealed
-from ema_model.quantities.axes import Axes
+from ema_model.practice import Revealed, challenge_in, make, reveal, shipped
+from ema_model.quantities import Axes, in_sentence, number
 from ema_model.recordings import ColumnMapping, Measurement, hints_of, prepared, read_columns, read_head, read_side_file
 from ema_model.recordings.formats.text_layout import Head, Hints
 from ema_model.recordings.health import Health, health_of
 from ema_model.recordings.read import how_to_read, recorded
 from ema_model.recordings.side_file import SideFile, find_side_file
 from ema_model.text import InWords
-from emaviz.session.data_folder import ACTUATOR_SUFFIX, DataFolder
-from emaviz.session.inputs import digest, version_of
+from emaviz.recording.entry import Entry
+from emaviz.session.data_folder import ACTUATOR_SUFFIX, DataFolder, sanitised
 from emaviz.session.jobs import Job, Run, Signal
+from emaviz.session.session_file import digest, version_of
+
+if TYPE_CHECKING:
+    from emaviz.recording.read import Recording
+
 
 # --- a recording that is chosen for Compare: its table, its mapping, and what was measured ----------------------------
 
@@ -251,3 +259,171 @@ class Practice:
         if one is None:
             raise InputError("this folder is of no challenge, so that nothing is sealed in it")
         return reveal(one, found)
+
+
+# --- what a recorded run is, in a line: its kind and what came of it, from what its file says of itself ---------------
+
+UNKNOWN = "run"
+
+
+def summary(said: Mapping[str, Any]) -> tuple[str, str]:
+    """('discovery', 'cogging torque: 1.69 → 0.757 × floor'); ('run', '') of a file that says nothing."""
+    for key, (kind, words) in _KINDS.items():
+        if isinstance(said.get(key), Mapping):
+            try:
+                return kind, words(said[key])
+            except (KeyError, TypeError, IndexError, ValueError):  # of another version
+                return kind, ""
+    return UNKNOWN, ""
+
+
+def _identification(found: Mapping[str, Any]) -> str:
+    names = sorted({name for one in found.values() for name in one.get("alarms", ())})
+    return "not healthy: " + ", ".join(names) if names else "healthy" if _all(found, "healthy") else "no single k off"
+
+
+def _all(found: Mapping[str, Any], name: str) -> bool:
+    return all(one.get(name) for one in found.values())
+
+
+def _discovery(found: Mapping[str, Any]) -> str:
+    names = [in_sentence(effect_title(str(one["name"]))) for one in found["effects"]]
+    errors = [found["ladder"][at]["rmse"] for at in (0, -1)]
+    if None in errors:
+        fell = ""
+    elif len(found["ladder"]) > 1:
+        fell = f"{number(errors[0])} → {number(errors[1])} × floor"
+    else:
+        fell = f"{number(errors[0])} × floor"
+    what = ", ".join(names) or str(found["verdict"]).replace("_", " ")
+    return f"{what}: {fell}" if fell else what
+
+
+def _comparison(found: Mapping[str, Any]) -> str:
+    return str(found["sentences"][0])
+
+
+def _tracking(found: Mapping[str, Any]) -> str:
+    trends = [name for name, one in found["faults"].items() if one.get("trend")]
+    return f"trend of {', '.join(trends)}" if trends else "no trend"
+
+
+_KINDS: dict[str, tuple[str, Callable[[Mapping[str, Any]], str]]] = {
+    "found": ("identification", _identification),
+    "discovery": ("discovery", _discovery),
+    "comparison": ("comparison", _comparison),
+    "track": ("tracking", _tracking),
+    "reproduce": ("evaluation", lambda _: "the thesis's tables beside ours"),
+    **{name: (in_sentence(one.title), lambda found: str(found["answer"][0])) for name, one in analyses().items()},
+}
+
+# --- past recordings: what the folder holds, with settings and results; renamed, deleted, read back -------------------
+
+_ENDING = ".rrd"
+
+
+class RecordedRuns:
+    """The folder of recordings.  Raises InputError, one line, for what is refused.
+
+    Only the names that the folder lists are taken; what a file says of itself is kept until the file changes.
+    """
+
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder.resolve()
+        self._known: dict[str, tuple[tuple[int, int], Entry]] = {}
+
+    def names(self) -> list[str]:
+        """Names of the recordings, the newest first."""
+        found = []
+        for one in os.scandir(self.folder):
+            if one.name.endswith(_ENDING) and not one.name.startswith(".") and one.is_file():
+                found.append((-one.stat().st_mtime_ns, one.name))
+        return [name for _, name in sorted(found)]
+
+    def entry(self, name: str) -> Entry:
+        """A recording with its settings and result, as far as it says them."""
+        path = self.path(name)
+        try:
+            status = path.stat()
+        except OSError as error:
+            raise InputError(f"{shown(name)}: cannot be read ({error.strerror})") from None
+        version = status.st_mtime_ns, status.st_size
+        known = self._known.get(name)
+        if known is None or known[0] != version:
+            said = _properties(path)
+            at = datetime.fromtimestamp(status.st_mtime)
+            known = version, Entry(name, at, status.st_size, **said)
+            self._known[name] = known
+        return known[1]
+
+    def read(self, name: str) -> Recording:
+        """Everything in it."""
+        from emaviz.recording import read
+
+        try:
+            return read(self.path(name))
+        except OSError as error:
+            raise InputError(str(error)) from None
+
+    def rename(self, name: str, wanted: Any) -> str:
+        """Gives it another name, made safe, and returns that; a name that is taken is refused."""
+        path = self.path(name)
+        stem = str(wanted).strip().removesuffix(_ENDING)
+        if not stem:
+            raise InputError("a run needs a name; type one first")
+        new = sanitised(stem + _ENDING)
+        target = self.folder / new
+        if new == name:
+            return name
+        if os.path.lexists(target):
+            raise InputError(f"{shown(new)} exists already; choose another name")
+        try:
+            path.rename(target)
+        except OSError as error:
+            raise InputError(f"{shown(name)}: cannot be renamed ({error.strerror})") from None
+        self._known.pop(name, None)
+        return new
+
+    def delete(self, name: str) -> None:
+        """Removes the file."""
+        try:
+            self.path(name).unlink()
+        except OSError as error:
+            raise InputError(f"{shown(name)}: cannot be deleted ({error.strerror})") from None
+        self._known.pop(name, None)
+
+    def path(self, name: str) -> Path:
+        """Where it is; refused unless the folder itself lists it."""
+        path = self.folder / name
+        try:
+            listed = Path(name).name == name and name.endswith(_ENDING) and path.is_file() and not path.is_symlink()
+        except OSError:  # longer than any name
+            listed = False
+        if not listed:
+            raise InputError(f"{shown(name)}: no such run; choose one of the list")
+        return path
+
+
+def _properties(path: Path) -> dict[str, Any]:
+    """What it is and came to; settings, answers and the best of an identification; nothing of damaged files."""
+    try:
+        from emaviz.recording.read import properties
+
+        said = properties(path)
+    except (OSError, ImportError):
+        return {}
+    kind, says = summary(said)
+    settings, found, best = said.get("settings"), said.get("found"), said.get("best")
+    if not (isinstance(settings, dict) and isinstance(found, dict) and isinstance(best, str)):
+        return {"kind": kind, "says": says}
+    return {"settings": settings, "found": found, "best": best, "kind": kind, "says": says}
+
+
+def recovered(recordings: Path) -> list[str]:
+    """What became of recordings of interrupted runs, a line each."""
+    try:
+        from emaviz.recording.read import recover
+
+        return [f"Recovered a recording of an interrupted run: {found}" for found in recover(recordings)]
+    except (OSError, ImportError) as error:
+        return [f"Interrupted recordings cannot be recovered: {error}"]

@@ -12,7 +12,7 @@ import msgspec
 
 from ema_model.actuator import Actuator, save_actuator
 from ema_model.errors import InputError, quoted
-from ema_model.fleet.folders import check_same_type, units_in
+from ema_model.fleet.compare import check_same_type, units_in
 from ema_model.fleet.result import UnitsCompared
 from ema_model.recordings import Measurement, read
 from ema_model.recordings.recording_set import long_enough
@@ -21,8 +21,8 @@ from emaviz.session import files as session_files
 from emaviz.session.data_folder import DataFolder
 from emaviz.session.explore import Session
 from emaviz.session.files import Practice, side_file_of
-from emaviz.session.inputs import Inputs, Provenance, Whole, digest, version_with_side
 from emaviz.session.jobs import Job, Run, Signal, Worker
+from emaviz.session.session_file import Inputs, Provenance, Whole, digest, version_with_side
 from emaviz.session.settings import taken
 
 

@@ -16,15 +16,23 @@ from ema_model.actuator import Actuator
 from ema_model.errors import InputError
 from ema_model.faults import NAMES, performance_coefficient
 from ema_model.identification.fit import CorrectedError
-from ema_model.identification.run import ALGORITHMS, SEARCH_SHARE, Identification, Progress, by_one_error, steps
+from ema_model.identification.run import (
+    ALGORITHMS,
+    SEARCH_SHARE,
+    Identification,
+    Progress,
+    by_one_error,
+    in_one_line,
+    landscape_words,
+    steps,
+)
 from ema_model.identification.search import Landscape, Objective, Way, extent, slices, ways
-from ema_model.identification.words import in_one_line, landscape_words
-from ema_model.quantities.numbers import amount
+from ema_model.quantities import amount
 from ema_model.recordings import Measurement
 from ema_model.result import restored, stored
 from ema_model.simulation import plant
-from emaviz.session.inputs import Inputs, Provenance, Whole
 from emaviz.session.jobs import Job, Run, Signal, Steps, Worker, elsewhere
+from emaviz.session.session_file import Inputs, Provenance, Whole
 from emaviz.session.settings import SLIDERS, Settings, title
 
 if TYPE_CHECKING:

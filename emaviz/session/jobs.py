@@ -14,7 +14,7 @@ from dataclasses import dataclass, field
 from typing import Generic, ParamSpec, Protocol, TypeVar
 
 from ema_model.errors import InputError, quoted
-from emaviz.text.time_left import going_on
+from emaviz.text import going_on
 
 # --- what happens, and those who asked to be told ---------------------------------------------------------------------
 

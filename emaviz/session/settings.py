@@ -18,8 +18,7 @@ from ema_model.effects import find
 from ema_model.errors import InputError, quoted
 from ema_model.faults import HEALTHY, physical
 from ema_model.identification.run import ALGORITHMS
-from ema_model.quantities.axes import ROTARY, Axes
-from ema_model.quantities.sides import MOTOR, USER, Side
+from ema_model.quantities import MOTOR, ROTARY, USER, Axes, Side
 from ema_model.recordings.measurement import Sensors
 from ema_model.simulation.plant import FITNESSES
 from ema_model.simulation.run import SHAPES, LoadProfile, Run

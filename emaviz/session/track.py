@@ -15,24 +15,22 @@ import msgspec
 import numpy as np
 
 from ema_model import faults
-from ema_model.actuator.write import as_toml
+from ema_model.actuator.file import as_toml
 from ema_model.errors import InputError, quoted
-from ema_model.files.arriving import LOOK_S, Watched
+from ema_model.files.opened import LOOK_S, Watched
 from ema_model.identification.run import Progress
 from ema_model.recordings import read
 from ema_model.recordings.recording_set import recordings_in
 from ema_model.recordings.side_file import SideFile
 from ema_model.result import restored, stored
-from ema_model.tracking.evidence import LEAST_FLIGHTS
 from ema_model.tracking.flights import Flight, check_enough, check_order, flights_in, identified, in_order
-from ema_model.tracking.history import History
-from ema_model.tracking.result import Tracked
-from ema_model.tracking.track import check_thresholds
+from ema_model.tracking.track import History, Tracked, check_thresholds
+from ema_model.tracking.trends import LEAST_FLIGHTS
 from emaviz.session.data_folder import DataFolder
 from emaviz.session.explore import Session
 from emaviz.session.files import Practice, side_file_of
-from emaviz.session.inputs import Inputs, Provenance, Room, version_with_side
 from emaviz.session.jobs import RESTED, Job, Run, Signal, Stopped, Worker
+from emaviz.session.session_file import Inputs, Provenance, Room, version_with_side
 from emaviz.session.settings import number, taken
 
 # --- what a session's file holds of Track -----------------------------------------------------------------------------

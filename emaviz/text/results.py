@@ -10,8 +10,7 @@ from typing import Literal
 from ema_model.comparison.result import Comparison
 from ema_model.discovery.result import Discovery
 from ema_model.fleet.result import UnitsCompared
-from ema_model.identification.run import Identification
-from ema_model.identification.words import remarks
+from ema_model.identification.run import Identification, remarks
 from ema_model.text import COLOURS, Block, Document, Table
 from emaviz.text.html import Html, boxed, html, joined, unescaped
 

@@ -1,4 +1,4 @@
-"""How results are shown: a file for each states its `VIEW`, its sections in reading order.
+"""How results are shown: a file for each states its `VIEW`, or several: sections in reading order.
 
 Report, page, recording and notebook read the same list.  A section is a title and its parts: what the result says in
 words, and figures.  Where that depends on what was found, a function of the result tells what the section holds, piece
@@ -187,7 +187,8 @@ def view_of(result: R) -> View[R]:
 
 def view_for(kind: type[R]) -> View[R]:
     """The same by the class."""
-    for view in members("emaviz.views", "VIEW").values():
-        if issubclass(kind, view.of):
-            return view
+    for stated in members("emaviz.views", "VIEW").values():
+        for view in stated if isinstance(stated, tuple) else (stated,):
+            if issubclass(kind, view.of):
+                return view
     raise InputError(f"a {kind.__name__} has no view; print it instead")

@@ -12,15 +12,11 @@ import plotly.graph_objects as go
 
 from ema_model import faults
 from ema_model.actuator.parameters import on_axes
-from ema_model.campaign.kinds import benchmark
-from ema_model.campaign.result import Campaign, made_with
-from ema_model.campaign.store import failed, summaries
+from ema_model.campaign import benchmark
+from ema_model.campaign.store import Campaign, failed, made_with, summaries
 from ema_model.discovery.result import effect_title
 from ema_model.effects import CATALOGUE
-from ema_model.quantities.axes import ROTARY
-from ema_model.quantities.numbers import amount
-from ema_model.quantities.titles import in_sentence
-from ema_model.quantities.variables import explanation_title
+from ema_model.quantities import ROTARY, amount, explanation_title, in_sentence
 from emaviz.figures import campaign
 from emaviz.text.results import Meaning
 from emaviz.views import Columns, Line, Piece, Row, Section, View

@@ -17,8 +17,7 @@ from ema_model.discovery.words import FLOOR_NOTE, Track, fitted_of, primary, tra
 from ema_model.effects import Effect, find
 from ema_model.effects.effect import FAMILIES
 from ema_model.estimation.calibrate import calibration_table, convergence, warnings
-from ema_model.quantities.numbers import number
-from ema_model.quantities.titles import in_sentence
+from ema_model.quantities import in_sentence, number
 from ema_model.recordings import SIGNALS
 from ema_model.text import Table
 from emaviz import __version__

@@ -14,9 +14,8 @@ from ema_model import faults
 from ema_model.actuator.actuator import readings, sentences
 from ema_model.actuator.parameters import on_axes
 from ema_model.errors import InputError
-from ema_model.identification.run import Identification, algorithm_title
-from ema_model.identification.words import CORRECTED, verdict
-from ema_model.quantities.numbers import amount, number
+from ema_model.identification.run import CORRECTED, Identification, algorithm_title, verdict
+from ema_model.quantities import amount, number
 from emaviz import __version__
 from emaviz.figures import identification, theme
 from emaviz.recording.entry import RecordingError

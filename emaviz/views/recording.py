@@ -14,8 +14,7 @@ from ema_model.errors import InputError
 from ema_model.result import Result
 from emaviz import colours
 from emaviz.recording import blueprint
-from emaviz.recording.entry import RecordingError
-from emaviz.recording.style import ANSWER
+from emaviz.recording.entry import ANSWER, RecordingError
 from emaviz.recording.writer import RecordingWriter, written
 from emaviz.views import View, figures_of
 

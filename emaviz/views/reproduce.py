@@ -26,8 +26,7 @@ from ema_model.campaign.thesis import (
     case_of,
 )
 from ema_model.campaign.thesis_words import NAMES, NONE, answer, coefficient_table, number, row_table, short_table
-from ema_model.quantities.axes import of_signal
-from ema_model.quantities.titles import in_sentence
+from ema_model.quantities import in_sentence, of_signal
 from emaviz.figures import campaign, comparison
 from emaviz.figures.campaign import SearchEffort
 from emaviz.views import Columns, Group, Line, Piece, Row, Section, View

@@ -7,8 +7,8 @@ from collections.abc import Iterator
 
 import plotly.graph_objects as go
 
-from ema_model.exports.result import Export, TargetProof
-from ema_model.quantities.axes import of_signal
+from ema_model.exports.replay import Export, TargetProof
+from ema_model.quantities import of_signal
 from emaviz.figures import theme
 from emaviz.figures.theme import line
 from emaviz.views import ANSWER, Group, Piece, Row, Section, View

@@ -12,10 +12,9 @@ from support.on_page import wait_until
 from ema_model.actuator import load_actuator
 from ema_model.campaign import load_plan
 from ema_model.campaign.kinds import KINDS
-from ema_model.campaign.plan_axes import inputs_of
-from ema_model.campaign.result import Campaign
 from ema_model.campaign.rows import common
-from ema_model.campaign.store import Store, header_of
+from ema_model.campaign.store import Campaign, Store, header_of
+from ema_model.campaign.task import inputs_of
 from ema_model.errors import InputError
 from emaviz.page.campaigns import figures, label, progress_bars, tables
 from emaviz.recording import read

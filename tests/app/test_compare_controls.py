@@ -13,7 +13,7 @@ from ema_model.commands import command
 from ema_model.recordings import write_measurement
 from ema_model.recordings.measurement import Sensors
 from ema_model.simulation.run import Run, simulate_reference
-from emaviz.page.compare.tab import CompareTab
+from emaviz.page.compare import CompareTab
 from emaviz.recording import read
 
 pytestmark = [pytest.mark.browser, pytest.mark.long]

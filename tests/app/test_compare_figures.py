@@ -11,8 +11,7 @@ from hypothesis import strategies as st
 from plotly.offline import get_plotlyjs
 from support.comparison_by_hand import comparison as by_hand
 
-from ema_model.quantities.numbers import amount, number
-from ema_model.quantities.variables import MODULATORS, variable_title
+from ema_model.quantities import MODULATORS, amount, number, variable_title
 from emaviz.figures import campaign, theme
 from emaviz.figures import comparison as comparison_figures
 from emaviz.figures.comparison import time_ranges

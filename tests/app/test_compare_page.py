@@ -20,10 +20,10 @@ from ema_model.recordings import write_measurement
 from ema_model.recordings.measurement import Sensors
 from ema_model.simulation.run import Run, simulate_reference
 from emaviz.page.app import App
-from emaviz.page.compare.result import View
-from emaviz.page.compare.tab import CompareTab
-from emaviz.page.explore.tab import ExploreTab
-from emaviz.page.identify.tab import IdentifyTab
+from emaviz.page.compare import CompareTab
+from emaviz.page.compare_result import View
+from emaviz.page.explore import ExploreTab
+from emaviz.page.identify import IdentifyTab
 from emaviz.page.track import TrackTab
 
 pytestmark = pytest.mark.browser

@@ -10,7 +10,7 @@ import viser
 from support.on_page import wait_until
 from support.raw_page import RawPage
 
-from emaviz.server.messages import LONGEST_TEXT, MOST_INT
+from emaviz.server.access import LONGEST_TEXT, MOST_INT
 from emaviz.server.safe_server import open_server
 
 # Refused by every control.  3000 digits come as text or as an extension: msgpack's own integers end at 2⁶⁴.

@@ -13,8 +13,8 @@ from support.on_page import choose, field, fill, wait_until
 
 from ema_model.faults import HEALTHY
 from ema_model.identification.uncertainty import Suggestion
-from emaviz.page.explore.tab import ExploreTab
-from emaviz.page.identify.tab import IdentifyTab
+from emaviz.page.explore import ExploreTab
+from emaviz.page.identify import IdentifyTab
 from emaviz.recording import read
 from emaviz.session.settings import Settings
 

@@ -17,10 +17,10 @@ from ema_model.discovery.words import faults, headline, sentences
 from ema_model.errors import InputError
 from emaviz.figures import discovery
 from emaviz.figures.discovery import equation
-from emaviz.page.discover import candidate
-from emaviz.page.discover.candidate import about_fault
-from emaviz.page.discover.result import answer
-from emaviz.session.discover.source import agrees, document_of
+from emaviz.page import discover_candidate
+from emaviz.page.discover_candidate import about_fault
+from emaviz.page.discover_result import answer
+from emaviz.session.discovery_source import agrees, document_of
 from emaviz.text.results import MEANINGS
 
 pytestmark = pytest.mark.long
@@ -56,7 +56,7 @@ def test_start_offers_the_fault_beside_the_effects(rig):
     assert not look.found.faults and look.steps == 1, "a person decides"
     best = look.promising[0]
     assert best.name == "k2" and look.share(best) > 0.5
-    text = candidate.label(look, best)
+    text = discover_candidate.label(look, best)
     assert text.startswith("Backlash (fault k2)\nerror ") and "backlash " in text and "µrad, k2 ≈ 0." in text
     assert "% probable" in text
     assert "Next: backlash (fault k2), " in answer(look)

@@ -9,7 +9,7 @@ import pytest
 from support.browser import WINDOW
 from support.on_page import wait_until
 
-from emaviz.page.explore.tab import ExploreTab
+from emaviz.page.explore import ExploreTab
 from emaviz.page.style import STRIP_HEIGHT_PX
 
 pytestmark = pytest.mark.browser

@@ -17,12 +17,12 @@ from ema_model.discovery.words import tracks
 from ema_model.effects.user import user_torque
 from ema_model.errors import InputError
 from ema_model.faults import HEALTHY
-from emaviz.page.discover import candidate
-from emaviz.page.discover.result import _SHOWN, as_csv, run_of
-from emaviz.page.discover.tab import STEPS, step
+from emaviz.page import discover_candidate
+from emaviz.page.discover import STEPS, step
+from emaviz.page.discover_result import _SHOWN, as_csv, run_of
 from emaviz.recording.read import read
 from emaviz.scene.playback import motion
-from emaviz.session.discover.source import agrees, document_of
+from emaviz.session.discovery_source import agrees, document_of
 
 EASY = "first_bench_run"
 
@@ -54,7 +54,7 @@ def test_the_first_card_is_what_is_hidden(fresh):
     look = fresh.look
     best = look.promising[0]
     assert best.name == "cogging_torque" and best.settings["order"] == 14
-    text = candidate.label(look, best)
+    text = discover_candidate.label(look, best)
     assert "order 14" in text and "mN·m" in text and f"{100.0 * look.share(best):.0f} %" in text
     amplitude, half = best.settings["amplitude_Nm"], look.uncertainty(best)
     assert abs(amplitude - 0.02) < 2.0 * half < 0.005

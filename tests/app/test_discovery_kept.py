@@ -16,12 +16,12 @@ from ema_model.discovery import begun
 from ema_model.discovery.result import Experiment
 from ema_model.effects.user import user_torque
 from ema_model.errors import InputError
-from emaviz.page.discover import candidate
-from emaviz.page.discover.result import answer
+from emaviz.page import discover_candidate
+from emaviz.page.discover_result import answer
 from emaviz.session import session_file
 from emaviz.session.data_folder import DataFolder
-from emaviz.session.discover.history import KEPT, WHOLE, Entries, StoredStory, Telling
-from emaviz.session.discover.source import Recipe, agrees, document_of, sensors_of, truth_of
+from emaviz.session.discovery_history import KEPT, WHOLE, Entries, StoredStory, Telling
+from emaviz.session.discovery_source import Recipe, agrees, document_of, sensors_of, truth_of
 from emaviz.session.session_file import Part
 from emaviz.session.settings import Settings
 
@@ -120,7 +120,7 @@ def drawn(discovering):
         [figure.to_json() for figure in look.found.figures()],
         look.removable,
         [(one.name, look.predicted_rmse(one), look.uncertainty(one), look.probability(one)) for one in look.promising],
-        None if best is None else candidate.fall(look, best) + candidate.chance(look, best),
+        None if best is None else discover_candidate.fall(look, best) + discover_candidate.chance(look, best),
         [one.to_dict() if hasattr(one, "to_dict") else repr(one.sentence) for one in look.explained_before],
         None if look.assessment is None else sorted(look.assessment.alike.items()),
         discovering.experiment,

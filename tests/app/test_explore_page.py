@@ -19,8 +19,8 @@ from ema_model.simulation.run import Run, simulate_monitor, simulate_reference
 from emaviz.figures import runs as runs_figures
 from emaviz.figures.lines import within
 from emaviz.figures.runs import at, beneath, differences, metrics, rise_time_s, run_metrics_table
-from emaviz.page.explore.tab import CUSTOM, PRESETS, ExploreTab, name_of
-from emaviz.page.identify.tab import IdentifyTab
+from emaviz.page.explore import CUSTOM, PRESETS, ExploreTab, name_of
+from emaviz.page.identify import IdentifyTab
 from emaviz.session.explore import Session
 from emaviz.session.settings import Settings
 

@@ -13,7 +13,7 @@ from ema_model.actuator import load_actuator
 from ema_model.faults import vector
 from ema_model.simulation.run import simulate_monitor
 from emaviz.page.charts import png
-from emaviz.page.explore.tab import ExploreTab
+from emaviz.page.explore import ExploreTab
 from emaviz.session.explore import SEVERITIES, fan_of
 from emaviz.session.settings import Settings, Undo
 

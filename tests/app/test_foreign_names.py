@@ -9,8 +9,8 @@ from support.on_page import choose, wait_until
 from support.representative import first_of
 
 from emaviz.page.app import App
-from emaviz.page.explore.tab import ExploreTab
-from emaviz.page.identify.tab import PLANT
+from emaviz.page.explore import ExploreTab
+from emaviz.page.identify import PLANT
 from emaviz.text.html import said
 
 pytestmark = pytest.mark.browser

@@ -15,8 +15,7 @@ from support.raw_page import CAMERA, RawPage
 
 from ema_model.recordings import write_measurement
 from emaviz.server import access
-from emaviz.server.access import TYPING_S
-from emaviz.server.messages import MOST_INT, checked
+from emaviz.server.access import MOST_INT, TYPING_S, checked
 from emaviz.server.viser_private import Inside
 
 NUMBERS = (viser.GuiNumberHandle, viser.GuiSliderHandle)

@@ -14,17 +14,16 @@ from ema_model.actuator import load_actuator
 from ema_model.commands import command
 from ema_model.errors import InputError
 from ema_model.faults import performance_coefficient, vector
-from ema_model.identification.run import ALGORITHMS, Progress
+from ema_model.identification.run import ALGORITHMS, Progress, facts, way_sentences, why_best
 from ema_model.identification.search import slices, ways
-from ema_model.identification.words import facts, way_sentences, why_best
-from ema_model.quantities.numbers import amount
+from ema_model.quantities import amount
 from ema_model.recordings import write_measurement
 from ema_model.recordings.measurement import Sensors
 from ema_model.recordings.read import read_measurement
 from ema_model.simulation.run import Run, simulate_reference
 from emaviz.figures import identification
 from emaviz.figures.identification import Row, table
-from emaviz.page.identify.result import at_iteration, telling
+from emaviz.page.identify import at_iteration, telling
 from emaviz.recording.read import read
 from emaviz.session.explore import Session
 from emaviz.session.identify import MOST_FRAMES, Track, ends

@@ -10,8 +10,8 @@ from support.on_page import choose, wait_until
 from ema_model.errors import InputError
 from ema_model.recordings import ColumnMapping, MappedColumn
 from emaviz.figures.theme import LIGHT
-from emaviz.page.compare.columns import Edit, done, drawing, table
-from emaviz.page.compare.tab import CompareTab
+from emaviz.page.compare import CompareTab
+from emaviz.page.compare_columns import Edit, done, drawing, table
 from emaviz.session.files import Opened
 
 WIDE = """() => { const table = document.querySelector('.emaviz-map').getBoundingClientRect();

@@ -22,13 +22,12 @@ from emaviz.session import session_file
 from emaviz.session.campaigns import Campaigns
 from emaviz.session.compare import Comparing
 from emaviz.session.data_folder import DataFolder
-from emaviz.session.discover.discovering import Discovering
+from emaviz.session.discovering import Discovering
 from emaviz.session.explore import Session
 from emaviz.session.fleet import ComparingUnits
-from emaviz.session.inputs import Inputs, Provenance, results_part, version_of
 from emaviz.session.jobs import Job, Worker
 from emaviz.session.jobs import Run as JobRun
-from emaviz.session.session_file import Part
+from emaviz.session.session_file import Inputs, Part, Provenance, results_part, version_of
 from emaviz.session.track import Following
 
 FILES = {"bench": ("chirp.csv", "step.csv"), "fleet/a": ("sine.csv",), "fleet/b": ("sine.csv",)}

@@ -7,7 +7,7 @@ import urllib.request
 import pytest
 from support.on_page import wait_until
 
-from emaviz.page.identify.tab import IdentifyTab
+from emaviz.page.identify import IdentifyTab
 from emaviz.recording.writer import RecordingWriter
 
 pytestmark = pytest.mark.browser

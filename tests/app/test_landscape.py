@@ -10,9 +10,9 @@ import pytest
 
 from ema_model.errors import InputError
 from ema_model.faults import HEALTHY, vector
+from ema_model.identification.run import landscape_words, way_sentences
 from ema_model.identification.search import Landscape, Way, extent, slices, ways
 from ema_model.identification.uncertainty import Suggestion
-from ema_model.identification.words import landscape_words, way_sentences
 from ema_model.simulation.run import run_in_words
 from emaviz.figures import identification
 from emaviz.text.results import sure_words

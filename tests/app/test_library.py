@@ -8,8 +8,8 @@ from types import SimpleNamespace
 from support.on_page import wait_until
 
 from ema_model.actuator import load_actuator
-from emaviz.session import library as module
-from emaviz.session.library import Library
+from emaviz.session import explore as module
+from emaviz.session.explore import Library
 
 
 def test_what_compiles_is_told_until_the_run_is_there(worker, monkeypatch):

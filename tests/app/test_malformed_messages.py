@@ -13,7 +13,7 @@ from support.raw_page import CAMERA, RawPage
 from websockets.exceptions import InvalidStatus
 from websockets.sync.client import connect
 
-from emaviz.server import messages
+from emaviz.server import access
 from emaviz.server.access import Complaints
 from emaviz.server.safe_server import open_server
 
@@ -75,7 +75,7 @@ def test_one_line_and_the_page_stays(server, told, message, capfd):
 
 def test_a_huge_frame_ends_its_connection_alone(server, told):
     with RawPage(server.get_port()) as other, RawPage(server.get_port()) as raw:
-        raw.send(b"\x00" * (messages.LARGEST_FRAME + 1))
+        raw.send(b"\x00" * (access.LARGEST_FRAME + 1))
         assert raw.closed.wait(10.0)
         wait_until(lambda: told, 10.0)
         assert len(told) == 1 and "exceeds limit" in told[0]
@@ -188,11 +188,11 @@ def test_a_file_needs_a_button_that_takes_one(server, told):
 
 def test_every_message_that_viser_listens_to_is_decided_on(server):
     """Each name and field here is viser's; a new viser that listens to something else is noticed."""
-    for kind in messages.Message.__subclasses__():
+    for kind in access.Message.__subclasses__():
         theirs = dataclasses.fields(getattr(viser._messages, kind.__name__))
         assert [field.name for field in theirs if field.init] == list(kind.__struct_fields__), kind
     heard = {kind.__name__ for kind in server._websock_server._incoming_handlers}
-    known = {kind.__name__ for kind in messages.Message.__subclasses__()}
+    known = {kind.__name__ for kind in access.Message.__subclasses__()}
     assert heard - known == {"ShareUrlRequest", "ShareUrlDisconnect"}
     assert known - heard == {  # which viser listens to on a page's own connection, the answers after its questions
         "ViewerCameraMessage",

@@ -9,7 +9,7 @@ from ema_model.actuator import load_actuator
 from ema_model.actuator.parameters import says_drive
 from ema_model.actuator.reference import kinds_of_actuators, parameter_rows
 from ema_model.errors import InputError
-from ema_model.quantities.axes import Axes
+from ema_model.quantities import Axes
 from emaviz.cli import main
 from emaviz.session.data_folder import DataFolder
 from emaviz.session.files import UPLOADED, Description

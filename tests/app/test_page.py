@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from support.on_page import wait_until
 
-from emaviz.page.identify.tab import IdentifyTab
+from emaviz.page.identify import IdentifyTab
 from emaviz.page.window_layout import LEFT_PX
 from emaviz.recording import read
 

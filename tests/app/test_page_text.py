@@ -15,10 +15,10 @@ from support.on_page import wait_until
 import emaviz
 from emaviz.figures import discovery, runs, theme
 from emaviz.page.app import App
-from emaviz.page.discover.tab import DiscoverTab
-from emaviz.page.explore.tab import ExploreTab
+from emaviz.page.discover import DiscoverTab
+from emaviz.page.explore import ExploreTab
 from emaviz.page.runs import _card
-from emaviz.session.recorded_runs import RecordedRuns, recovered
+from emaviz.session.files import RecordedRuns, recovered
 from emaviz.text.html import Html, html, html_escape, joined, said
 
 RAW = ("<iframe srcdoc", "<img", "<script", 'href="javascript')

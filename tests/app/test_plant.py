@@ -15,7 +15,7 @@ from ema_model.simulation import compiled, plant
 from ema_model.simulation.compiled import library_stack, own_stack, stack_at_hand
 from ema_model.simulation.run import Run, simulate_monitor, simulate_reference
 from emaviz.page.app import App
-from emaviz.page.explore.tab import ExploreTab
+from emaviz.page.explore import ExploreTab
 from emaviz.session.explore import Session
 from emaviz.session.files import shipped_actuators
 

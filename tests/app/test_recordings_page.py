@@ -19,7 +19,7 @@ from emaviz.recording import RecordingWriter, read
 from emaviz.recording.entry import setting
 from emaviz.recording.viewer import ViewerHost
 from emaviz.session.explore import Session
-from emaviz.session.recorded_runs import RecordedRuns
+from emaviz.session.files import RecordedRuns
 
 
 def identify(session, seconds=60.0):

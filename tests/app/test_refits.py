@@ -11,8 +11,8 @@ from support.rig import Rig
 
 from ema_model.discovery.snapshot import user_begins
 from ema_model.effects.user import parse, user_torque
-from emaviz.page.discover import candidate
-from emaviz.page.discover.candidate import reach
+from emaviz.page import discover_candidate
+from emaviz.page.discover_candidate import reach
 
 
 @pytest.fixture(scope="module")
@@ -44,12 +44,14 @@ def test_candidates_are_shown_as_algebra_ranks_them_and_again_as_each_is_refitte
     assert best.name == first.name == "cogging_torque" and best.refitted_drop > 0.0 and first.refitted_drop is None
     algebra, refitted = ranked[0].predicted_rmse(first), ranked[-1].predicted_rmse(best)
     assert refitted == ranked[-1].assessment.refitted[best.name] == pytest.approx(algebra, rel=0.25)
-    assert "refitted" in candidate.fall(ranked[-1], best) and "≈" in candidate.fall(ranked[0], first)
+    assert "refitted" in discover_candidate.fall(ranked[-1], best) and "≈" in discover_candidate.fall(ranked[0], first)
     improbable = [one for one in ranked[-1].promising if ranked[-1].probability(one) < 0.01]
-    assert candidate.chance(ranked[-1], best) == "> 99.9 % probable" and improbable
-    assert {candidate.chance(ranked[-1], one) for one in improbable} == {"not the next"}, "whatever it would take away"
-    assert "Ranked by algebra" in candidate.how_known(ranked[0], True)
-    assert "Ranked by refits" in candidate.how_known(ranked[-1], False)
+    assert discover_candidate.chance(ranked[-1], best) == "> 99.9 % probable" and improbable
+    assert {discover_candidate.chance(ranked[-1], one) for one in improbable} == {"not the next"}, (
+        "whatever it would take away"
+    )
+    assert "Ranked by algebra" in discover_candidate.how_known(ranked[0], True)
+    assert "Ranked by refits" in discover_candidate.how_known(ranked[-1], False)
 
 
 def test_a_step_that_is_asked_for_ends_the_refits(discovering):

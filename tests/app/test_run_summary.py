@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 from support.on_page import wait_until
 
-from ema_model.quantities.numbers import with_uncertainty
-from emaviz.page.discover.tab import step
-from emaviz.session.recorded_runs import RecordedRuns, summary
+from ema_model.quantities import with_uncertainty
+from emaviz.page.discover import step
+from emaviz.session.files import RecordedRuns, summary
 
 
 @pytest.mark.parametrize(

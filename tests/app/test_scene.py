@@ -24,10 +24,9 @@ from emaviz.page.window_layout import LEFT_PX, _width_px
 from emaviz.scene import actuator as actuator_scene
 from emaviz.scene import solids
 from emaviz.scene.actuator import _NAMES, NAMED_AT, ActuatorScene
-from emaviz.scene.framing import BOXES, frame
 from emaviz.scene.labels import Label, lay_out
 from emaviz.scene.playback import Playback, enlargement, motion
-from emaviz.scene.solids import FAULT, RESIDUAL
+from emaviz.scene.solids import BOXES, FAULT, RESIDUAL, frame
 from emaviz.server.safe_server import open_server
 from emaviz.session.explore import Simulation
 

@@ -14,13 +14,13 @@ from support.on_page import wait_until
 
 from ema_model.actuator import load_actuator
 from emaviz.figures.identification import Marks, fault_bars, landscape_figure
-from emaviz.page.identify.result import at_iteration
+from emaviz.page.identify import at_iteration
 from emaviz.recording import RecordingError, read
 from emaviz.session import session_file
 from emaviz.session.data_folder import DataFolder
 from emaviz.session.explore import Session, Simulation
 from emaviz.session.identify import ends
-from emaviz.session.inputs import results_part
+from emaviz.session.session_file import results_part
 from emaviz.text.results import sure_words
 
 

@@ -20,10 +20,10 @@ from ema_model.recordings import write_measurement
 from ema_model.simulation.run import Run, simulate_reference
 from emaviz.figures.identification import Row
 from emaviz.page.app import App
-from emaviz.page.compare.tab import Asked
-from emaviz.page.compare.tab import kept as compare_kept
-from emaviz.page.discover.tab import DiscoverTab
-from emaviz.page.identify.tab import IdentifyTab
+from emaviz.page.compare import Asked
+from emaviz.page.compare import kept as compare_kept
+from emaviz.page.discover import DiscoverTab
+from emaviz.page.identify import IdentifyTab
 from emaviz.page.playback import Looks, PlaybackStrip
 from emaviz.page.runs import RunsTab
 from emaviz.page.tab import Shared
@@ -31,10 +31,9 @@ from emaviz.page.workspaces import Page, Workspaces
 from emaviz.session import session_file
 from emaviz.session.compare import Comparing
 from emaviz.session.data_folder import DataFolder
-from emaviz.session.discover.source import SavedStory
+from emaviz.session.discovery_source import SavedStory
 from emaviz.session.explore import Session
-from emaviz.session.inputs import results_part
-from emaviz.session.session_file import Part
+from emaviz.session.session_file import Part, results_part
 from emaviz.session.settings import Settings, taken
 
 

@@ -10,7 +10,7 @@ import pytest
 from support.on_page import wait_until
 
 from emaviz.cli import main as emaviz
-from emaviz.page.compare.tab import CompareTab
+from emaviz.page.compare import CompareTab
 
 HINGE = (
     "simulate --effect hinge_moment:stiffness_Nm_rad=1000 --command sine --set amplitude_rad=0.025 "

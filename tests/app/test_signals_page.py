@@ -13,12 +13,12 @@ from support.comparison_by_hand import comparison as by_hand
 from support.on_page import choose, wait_until
 
 from ema_model.recordings.window import reading
-from emaviz.figures import lines, overlays
+from emaviz.figures import lines, runs
 from emaviz.figures.lines import Lines, clipped
-from emaviz.page.compare.result import View, telling_window
-from emaviz.page.compare.tab import CompareTab
-from emaviz.page.explore.tab import ExploreTab
-from emaviz.page.measure import Measuring
+from emaviz.page.charts import Measuring
+from emaviz.page.compare import CompareTab
+from emaviz.page.compare_result import View, telling_window
+from emaviz.page.explore import ExploreTab
 from emaviz.server.viser_private import id_of
 
 TIME = np.linspace(0.0, 1.0, 4001)
@@ -65,7 +65,7 @@ def test_a_window_is_clipped_to_the_samples(asked, window):
 
 def test_recordings_are_laid_over_each_other_from_their_events_on():
     comparison = by_hand(("one", "two"))
-    over, apart = overlays.together(comparison, "current_A")
+    over, apart = runs.together(comparison, "current_A")
     assert [one.name for one in over.lines][:4] == [
         "one, measured",
         "one, calibrated",
@@ -77,7 +77,7 @@ def test_recordings_are_laid_over_each_other_from_their_events_on():
     step = TIME > 0.5
     for i, one in enumerate(comparison.recordings):
         one.measured["user_position_rad"][:] = np.interp(one.time_s, TIME + 0.1 * i, step.astype(float))
-    over, _ = overlays.together(comparison, "user_position_rad")
+    over, _ = runs.together(comparison, "user_position_rad")
     risen = [one.time_s[np.argmax(one.values > 0.5 * one.values.max())] for one in (over.lines[0], over.lines[3])]
     assert "event" in over.time and risen[0] == pytest.approx(risen[1], abs=0.01)
     window = telling_window(View(comparison))

@@ -8,7 +8,7 @@ import math
 import pytest
 
 from ema_model.errors import InputError
-from ema_model.quantities.axes import Axes
+from ema_model.quantities import Axes
 from emaviz.session.settings import Settings, limits
 
 NONSENSE = [math.nan, math.inf, "abc", None, "", [], {}, "<script>"]

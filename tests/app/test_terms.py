@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import re
 
-from emaviz.text.html import html
-from emaviz.text.terms import TERMS, explained
+from emaviz.text.html import TERMS, explained, html
 
 
 def test_a_term_is_explained_once_and_the_text_stays():

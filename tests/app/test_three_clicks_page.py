@@ -11,8 +11,8 @@ from support.comparison_by_hand import comparison as by_hand
 from support.on_page import wait_until
 
 from ema_model.recordings.window import reading
-from emaviz.page.compare.tab import CompareTab
-from emaviz.page.discover.tab import DiscoverTab
+from emaviz.page.compare import CompareTab
+from emaviz.page.discover import DiscoverTab
 
 pytestmark = pytest.mark.browser
 

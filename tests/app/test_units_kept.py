@@ -13,9 +13,8 @@ from emaviz.session import session_file
 from emaviz.session.data_folder import DataFolder
 from emaviz.session.explore import Session
 from emaviz.session.fleet import ComparingUnits
-from emaviz.session.inputs import results_part
 from emaviz.session.jobs import Worker
-from emaviz.session.session_file import Part
+from emaviz.session.session_file import Part, results_part
 
 ACTUATOR = load_actuator()
 PLAY, GAIN = "transmission.backlash_rad", "controller.speed_gain_Nms_rad"

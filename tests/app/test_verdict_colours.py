@@ -10,13 +10,12 @@ import pytest
 from support.comparison_by_hand import comparison
 from support.discovered import with_cogging
 
-from emaviz.page.compare.result import headline
-from emaviz.page.discover.result import answer
-from emaviz.report.html_document import Figures
+from emaviz.page.compare_result import headline
+from emaviz.page.discover_result import answer
 from emaviz.text.results import MEANINGS, of_discovery, of_units
 from emaviz.views import discovery
 from emaviz.views.comparison import VIEW
-from emaviz.views.export import markup
+from emaviz.views.export import Figures, markup
 
 GREEN = MEANINGS["good"]
 

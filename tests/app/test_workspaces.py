@@ -13,7 +13,7 @@ from ema_model.commands import command
 from ema_model.recordings import write_measurement
 from ema_model.recordings.measurement import Sensors
 from ema_model.simulation.run import Run, simulate_reference
-from emaviz.page.explore.tab import ExploreTab
+from emaviz.page.explore import ExploreTab
 
 pytestmark = pytest.mark.browser
 

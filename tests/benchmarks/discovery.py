@@ -22,7 +22,7 @@ def record(folder: Path) -> None:
     """Recordings as a rig leaves them: files, so that what makes them is not counted."""
     from support.hidden_effects import SINE, recorded
 
-    from ema_model.recordings.write import write_measurement
+    from ema_model.recordings.read import write_measurement
 
     commands = [SINE, ("chirp", {}, 0.5), ("step", {"final_rad": 0.005}, 0.5)]
     unseen = [("sine", {"amplitude_rad": 0.02, "frequency_Hz": 5}, 0.5)]

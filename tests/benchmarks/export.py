@@ -22,7 +22,7 @@ from ema_model.actuator import Actuator
 from ema_model.actuator.file import cannot_represent
 from ema_model.effects import CATALOGUE
 from ema_model.exports.export import at_hand
-from ema_model.exports.result import Export
+from ema_model.exports.replay import Export
 from ema_model.recordings import Measurement
 
 ASSETS = Path(__file__).parents[2] / "assets"

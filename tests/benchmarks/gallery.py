@@ -26,7 +26,7 @@ from ema_model.faults import vector
 from emaviz.page.app import App
 from emaviz.page.fleet import UnitsTab
 from emaviz.page.frequency import FrequencyTab
-from emaviz.page.identify.tab import IdentifyTab
+from emaviz.page.identify import IdentifyTab
 from emaviz.page.runs import RunsTab
 from emaviz.page.track import TrackTab
 

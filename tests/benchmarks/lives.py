@@ -21,12 +21,10 @@ from life_oracles import Law, adds, oracle
 from life_peers import Array, Quantiles, exponential_fit, particle_filter
 
 from ema_model import faults
-from ema_model.campaign.kinds.track import ALPHA, LAMBDA, LAMBDAS, Told, places
+from ema_model.campaign.kinds import ALPHA, LAMBDA, LAMBDAS, Told, places
 from ema_model.estimation.problem import ECCENTRICITY, to_vector
-from ema_model.simulated_lives import LAWS, Life, drawn, worn_life
-from ema_model.simulated_lives.life import ONSET, POWER, base_of
-from ema_model.tracking.flights import Flight
-from ema_model.tracking.series import Unit
+from ema_model.simulated_lives import LAWS, ONSET, POWER, Life, base_of, drawn, worn_life
+from ema_model.tracking.flights import Flight, Unit
 from ema_model.tracking.track import Tracker
 
 WAYS = ("emaviz", "exponential fit", "particle filter", "law alone", "oracle", "bound")

@@ -103,7 +103,7 @@ def walked(run: Callable[[], None]) -> Walk:
 def slider_to_chart(folder: Path) -> Walk:
     """From a fault's slider to the redrawn signals, over the threads that compute and draw."""
     from emaviz.page.app import App
-    from emaviz.page.explore.tab import ExploreTab
+    from emaviz.page.explore import ExploreTab
 
     walk = Walk()  # before the app, whose threads it is to watch
     app = App("127.0.0.1", 0, folder)

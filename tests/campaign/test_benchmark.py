@@ -9,15 +9,15 @@ import numpy as np
 import pytest
 
 from ema_model.actuator import load_actuator
-from ema_model.campaign import bam
-from ema_model.campaign.kinds.benchmark import KIND, Settings, chosen, followed, needed
-from ema_model.campaign.plan_axes import TaskInputs
+from ema_model.campaign import benchmark
+from ema_model.campaign.benchmark import BENCHMARK, Settings, chosen, followed, needed
+from ema_model.campaign.task import TaskInputs
 from ema_model.errors import InputError
 from ema_model.recordings import Measurement
 
 ASSETS = Path(__file__).parents[2] / "assets"
 SERVO = load_actuator(ASSETS / "actuators" / "xl330.toml")
-BENCH = bam.Bench()
+BENCH = benchmark.Bench()
 TRUE = {
     "torque_constant_Nm_A": 0.4,
     "resistance_Ohm": 3.5,
@@ -31,15 +31,15 @@ TRUE = {
 
 def bam_logs(parameters, gains=(100, 400)) -> list[Measurement]:
     """What a model of BAM's would record, sampled as it steps."""
-    time = bam.STEP_S * np.arange(800)
+    time = benchmark.STEP_S * np.arange(800)
     found = []
     for gain in gains:
         goal = np.sin(time**2)
         blank = Measurement(
             {"time_s": time, "command_rad": goal, "user_position_rad": 0.0 * goal}, name=f"xl330_kp{gain}_made"
         )
-        logs = bam.Logs.of([blank], SERVO)
-        row = np.array([parameters.get(name, 0.0) for name in bam.BOUNDS])
+        logs = benchmark.Logs.of([blank], SERVO)
+        row = np.array([parameters.get(name, 0.0) for name in benchmark.BOUNDS])
         shown = np.append(logs.simulated(row, BENCH), 0.0)[: time.size]
         found.append(blank.with_signals(user_position_rad=shown))
     return found
@@ -53,12 +53,12 @@ def test_bam_steps_as_its_authors_do():
         "stribeck_exponent": 1.5,
         "load_stribeck": 0.1,
     }
-    time = bam.STEP_S * np.arange(3)
+    time = benchmark.STEP_S * np.arange(3)
     blank = Measurement(
         {"time_s": time, "command_rad": np.full(3, 0.8), "user_position_rad": np.full(3, 0.3)}, name="xl330_kp400_made"
     )
-    logs = bam.Logs.of([blank], SERVO)
-    shown = logs.simulated(np.array([parameters.get(name, 0.0) for name in bam.BOUNDS]), BENCH)
+    logs = benchmark.Logs.of([blank], SERVO)
+    shown = logs.simulated(np.array([parameters.get(name, 0.0) for name in benchmark.BOUNDS]), BENCH)
     gain, dt = 400 * (4096 / (2 * np.pi)) / (256 * 885), 5e-3
     inertia, q, dq = 0.49 * 0.1**2 + 2e-3, 0.3, 0.0
     for expected in shown:
@@ -76,9 +76,9 @@ def test_bam_steps_as_its_authors_do():
 
 @pytest.mark.parametrize("name", ["m1", "m3"])
 def test_bam_recovers_its_own_parameters(name):
-    true = {one: TRUE[one] for one in bam.MODELS[name]}
-    logs = bam.Logs.of(bam_logs(true), SERVO)
-    found = bam.fit(name, logs, BENCH, 1, starts=2, evaluations=5000)
+    true = {one: TRUE[one] for one in benchmark.MODELS[name]}
+    logs = benchmark.Logs.of(bam_logs(true), SERVO)
+    found = benchmark.fit(name, logs, BENCH, 1, starts=2, evaluations=5000)
     assert found.error_rad < 1e-4
     for one in ("coulomb_Nm", "offset_rad", *(["load"] if name == "m3" else [])):
         assert found.parameters[one] == pytest.approx(true[one], rel=0.05), one
@@ -87,9 +87,9 @@ def test_bam_recovers_its_own_parameters(name):
 
 
 def test_larger_models_hold_the_smaller_ones():
-    logs = bam.Logs.of(bam_logs(TRUE), SERVO)
+    logs = benchmark.Logs.of(bam_logs(TRUE), SERVO)
     assert np.all(logs.errors_rad(TRUE, BENCH) < 1e-12)
-    as_m6 = {name: TRUE.get(name, 0.0) for name in bam.MODELS["m6"]}
+    as_m6 = {name: TRUE.get(name, 0.0) for name in benchmark.MODELS["m6"]}
     as_m6 |= {"load_motor": 0.2, "load_external": 0.2, "stribeck_speed_rad_s": 0.1, "stribeck_exponent": 1.0}
     assert np.all(logs.errors_rad(as_m6, BENCH) < 1e-9)
     assert np.all(logs.errors_rad(TRUE | {"load": 0.0}, BENCH) > 1e-3)
@@ -100,10 +100,10 @@ def test_cma_es_finds_the_bottom_of_a_bent_valley():
         x = 4.0 * unit - 2.0
         return float(np.sum(100.0 * (x[1:] - x[:-1] ** 2) ** 2 + (1.0 - x[:-1]) ** 2))
 
-    least, where = bam.minimised(banana, 4, np.random.default_rng(2), 8000)
+    least, where = benchmark.minimised(banana, 4, np.random.default_rng(2), 8000)
     assert least < 1e-5
     np.testing.assert_allclose(where, 0.75, atol=2e-3)
-    edge, at = bam.minimised(lambda unit: float(np.sum(unit)), 3, np.random.default_rng(2), 3000)
+    edge, at = benchmark.minimised(lambda unit: float(np.sum(unit)), 3, np.random.default_rng(2), 3000)
     assert edge == pytest.approx(0.0, abs=1e-6) and np.all(at >= 0.0)
 
 
@@ -122,7 +122,7 @@ def joint(seconds: float, speed: float) -> Measurement:
 def test_least_squares_finds_what_a_joint_is_made_of():
     actuator = load_actuator(ASSETS / "field" / "ur10e.toml")
     inputs = TaskInputs(actuator, [joint(12.0, 1.3), joint(12.0, 2.1)], [joint(12.0, 1.7)])
-    row = KIND.run(inputs, Settings(method="least_squares", measure="torque"), 0)
+    row = BENCHMARK.run(inputs, Settings(method="least_squares", measure="torque"), 0)
     assert row["held_out_error"] < 0.5 and row["fitted_error"] < 0.5 and row["unit"] == "%"
     found = json.loads(row["parameters"])
     for name, true in {"inertia": 0.3, "viscous": 0.8, "coulomb": 0.5, "sin": 2.0, "cos": -1.0, "offset": 0.1}.items():
@@ -159,7 +159,7 @@ def test_least_squares_finds_a_servo_that_its_position_error_drives():
 
     one = made("a", lambda t: 0.8 * np.sin(1.1 * t) + 0.2 * np.sin(3.7 * t))
     other = made("b", lambda t: 0.9 * np.sin(0.7 * t) + 0.3 * np.sin(2.9 * t))
-    row = KIND.run(TaskInputs(actuator, [one], [other]), Settings(method="least_squares", measure="following"), 0)
+    row = BENCHMARK.run(TaskInputs(actuator, [one], [other]), Settings(method="least_squares", measure="following"), 0)
     found = json.loads(row["parameters"])
     for name, true in {"viscous": 0.1, "coulomb": 0.02, "cos": 0.05, "sin": 0.0}.items():
         assert found[name] == pytest.approx(true, abs=0.01), name
@@ -193,10 +193,10 @@ def test_discovery_never_sees_what_is_held_out(monkeypatch):
         assert [one.name for one in measurements] == ["joint at 1.3"] and not options.get("holdout")
         raise Asked
 
-    monkeypatch.setattr("ema_model.campaign.kinds.benchmark.discover", asked)
+    monkeypatch.setattr("ema_model.campaign.benchmark.discover", asked)
     inputs = TaskInputs(load_actuator(ASSETS / "field" / "ur10e.toml"), [joint(4.0, 1.3)], [joint(4.0, 1.7)])
     with pytest.raises(Asked):
-        KIND.run(inputs, Settings(measure="torque"), 0)
+        BENCHMARK.run(inputs, Settings(measure="torque"), 0)
 
 
 def test_what_no_method_can_do_is_refused_in_one_line():
@@ -208,7 +208,7 @@ def test_what_no_method_can_do_is_refused_in_one_line():
         with pytest.raises(InputError, match=told):
             Settings(**wrong)
     with pytest.raises(InputError, match="held out"):
-        KIND.run(TaskInputs(SERVO, [], []), Settings(), 0)
+        BENCHMARK.run(TaskInputs(SERVO, [], []), Settings(), 0)
 
 
 def test_the_choice_by_training_error_is_not_the_one_in_hindsight():

@@ -170,9 +170,9 @@ def test_a_damaged_part_is_named(made, folder, capsys):
 
 def test_a_scheduler_that_is_not_there(tmp_path, capsys, monkeypatch):
     pytest.importorskip("distributed")
-    from ema_model.campaign import schedulers
+    from ema_model.campaign import run
 
-    monkeypatch.setattr(schedulers, "_CONNECT_S", 0.5)
+    monkeypatch.setattr(run, "_CONNECT_S", 0.5)
     plan = cheap(tmp_path, 1)
     address = f"tcp://127.0.0.1:{free_port()}"
     line = told(["campaign", plan, "--out", tmp_path / "o", "--scheduler", address], capsys)

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from ema_model.actuator import load_actuator
-from ema_model.campaign.kinds.fleets import KIND, Settings, scored
+from ema_model.campaign.kinds import FLEETS, FleetSettings, scored
 from ema_model.errors import InputError
 from ema_model.fleet.result import Difference, OfType, Transfer, UnitsCompared
 from ema_model.simulated_fleets import Difference as True_
@@ -62,11 +62,11 @@ def test_a_wrong_unit_is_missed_and_false_but_of_two_units_either_differs():
 def test_a_claim_about_equal_units_is_false():
     row = scored(fleet(4), found(4, difference(2, PLAY, 0.4)))
     assert row["claimed"] and not row["exact"] and row["false"] == [f"unit_03 {PLAY}"]
-    told = KIND.told([row, scored(fleet(4), found(4))])
+    told = FLEETS.told([row, scored(fleet(4), found(4))])
     assert told["exact set"] == "1 of 2" and told["fleets with a false claim"] == 1
 
 
 @pytest.mark.parametrize("asked", [{"units": 1}, {"units": 30}, {"differing": 5}])
 def test_no_such_settings(asked):
     with pytest.raises(InputError, match="units are from 2"):
-        Settings(**asked)
+        FleetSettings(**asked)

@@ -14,8 +14,7 @@ from support.hidden_effects import recorded as by_hand
 
 from ema_model.campaign import load_plan, shipped_plans
 from ema_model.campaign.kinds import KINDS
-from ema_model.campaign.plan_axes import effects_of, inputs_of
-from ema_model.campaign.task import from_json, text_hash
+from ema_model.campaign.task import effects_of, from_json, inputs_of, text_hash
 from ema_model.effects import CATALOGUE
 from ema_model.errors import InputError
 

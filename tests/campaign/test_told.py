@@ -9,11 +9,9 @@ import pytest
 from support.cheap_plans import written
 
 from ema_model.campaign import Store, load_plan
-from ema_model.campaign.kinds.discover import tally
-from ema_model.campaign.kinds.identify import covered
-from ema_model.campaign.result import Campaign, progress_table, report_text
+from ema_model.campaign.kinds import covered, tally
 from ema_model.campaign.rows import common
-from ema_model.campaign.store import header_of, summaries
+from ema_model.campaign.store import Campaign, header_of, progress_table, report_text, summaries
 from ema_model.faults import HEALTHY, NAMES
 
 GROUPS = """

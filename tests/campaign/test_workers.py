@@ -12,9 +12,8 @@ from processes import environment
 from support.cheap_plans import cheap
 
 from ema_model.campaign import load_plan, store
-from ema_model.campaign.one_compiler import Turns
-from ema_model.campaign.rows import OtherVersion, row_of
-from ema_model.campaign.schedulers import Processes
+from ema_model.campaign.rows import OtherVersion, Turns, row_of
+from ema_model.campaign.run import Processes
 from ema_model.campaign.store import version
 from ema_model.simulation import compiled
 
@@ -73,9 +72,9 @@ def test_one_process_compiles_and_the_others_take_it(tmp_path):
 
 
 def test_a_lock_that_stays_is_waited_for_and_then_passed(tmp_path, monkeypatch):
-    from ema_model.campaign import one_compiler
+    from ema_model.campaign import rows
 
-    monkeypatch.setattr(one_compiler, "_LONGEST_S", 0.2)
+    monkeypatch.setattr(rows, "_LONGEST_S", 0.2)
     first, second = Turns(), Turns()
     path = tmp_path / "kernel.nbc"
     first.begin(path)
@@ -121,7 +120,7 @@ def test_the_version_follows_every_file_that_a_result_depends_on(tmp_path, monke
 
 def _behind_a_result(folder):
     """The kinds of tasks, and what they import of the campaign's folder."""
-    files, new = set(), set((folder / "kinds").glob("*.py"))
+    files, new = set(), {folder / "kinds.py"}
     while new:
         files |= new
         named = {name for file in new for name in IMPORTED.findall(file.read_text(encoding="utf-8"))}

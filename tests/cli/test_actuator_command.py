@@ -15,9 +15,12 @@ from support.documents import result_of
 from worked_actuators import BALL_SCREW, WORKED
 
 from ema_model.actuator import load_actuator, save_actuator
-from ema_model.actuator.keys import ENTRY, HEAD, KINDS, TABLES
 from ema_model.actuator.parameters import (
+    ENTRY,
+    HEAD,
+    KINDS,
     SECTIONS,
+    TABLES,
     Facts,
     facts_of,
     is_said,
@@ -29,8 +32,8 @@ from ema_model.actuator.parameters import (
 )
 from ema_model.actuator.reference import kinds_of_actuators, markdown, parameter_rows
 from ema_model.commands import command
-from ema_model.effects.user.entries import KEYS as USERS
-from ema_model.quantities.axes import Axes
+from ema_model.effects.user.torque import KEYS as USERS
+from ema_model.quantities import Axes
 from ema_model.recordings import Measurement, write_measurement
 from ema_model.simulation.run import Run, simulate_monitor
 from emaviz.cli import main

@@ -17,7 +17,7 @@ from support.documents import result_of
 
 from ema_model.commands import COMMANDS as MODEL_COMMANDS
 from ema_model.effects import CATALOGUE
-from ema_model.effects.user.entries import KINDS
+from ema_model.effects.user.torque import KINDS
 from ema_model.identification.run import ALGORITHMS
 from ema_model.recordings.read import read_measurement
 from ema_model.simulation.plant import FITNESSES

@@ -9,10 +9,10 @@ import pytest
 from support.documents import result_of
 
 from ema_model.effects import CATALOGUE
-from ema_model.effects.user.entries import KEYS
+from ema_model.effects.user.torque import KEYS
 from emaviz.cli import main
-from emaviz.report import effects as reference
 from emaviz.text.html import mathml
+from emaviz.views import effects as reference
 
 
 def test_the_users_own_are_listed_and_explained(tmp_path, capsys):

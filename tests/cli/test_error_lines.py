@@ -22,7 +22,7 @@ from ema_model.recordings.read import read_measurement
 from emaviz.cli import main
 from emaviz.session import session_file
 from emaviz.session.data_folder import DataFolder
-from emaviz.session.recorded_runs import RecordedRuns
+from emaviz.session.files import RecordedRuns
 from emaviz.session.settings import Settings
 
 LONG = "A" * 50_000

@@ -15,14 +15,14 @@ from ema_model import comparison, discovery
 from ema_model.actuator import load_actuator, shipped
 from ema_model.commands import command
 from ema_model.identification import search
-from ema_model.quantities.numbers import amount
+from ema_model.quantities import amount
 from ema_model.recordings import Measurement, read, write_measurement
 from ema_model.simulation import run as simulating
 from ema_model.simulation.run import Run, simulate_reference
 from emaviz.cli import main
 from emaviz.session.compare import Comparing
 from emaviz.session.data_folder import DataFolder
-from emaviz.session.discover.source import DiscoverySource
+from emaviz.session.discovery_source import DiscoverySource
 from emaviz.session.explore import Session
 
 BALL_SCREW = """

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from ema_model.actuator import load_actuator
-from ema_model.campaign.plan_axes import base_parameters
+from ema_model.campaign.task import base_parameters
 from ema_model.commands import command
 from ema_model.comparison import compare
 from ema_model.comparison.compare import _typical_floor

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from support.loggers import COMMANDS, Logger, healthy
 
-from ema_model.commands.recorded import between
+from ema_model.commands.command import between
 from ema_model.comparison import compare
 
 LOGGERS = [

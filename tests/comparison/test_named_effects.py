@@ -8,7 +8,7 @@ from support.unknown_drive import drive_of, logged
 
 import ema_model as em
 from ema_model.actuator import save_actuator
-from ema_model.recordings.write import write_measurement
+from ema_model.recordings.read import write_measurement
 from emaviz.cli import main
 
 MOMENT, ANGLE = "effects.pendulum_load.moment_Nm", "effects.pendulum_load.angle_rad"

@@ -21,8 +21,8 @@ import pytest
 from support.hidden_effects import ACTUATOR, SINE, recorded
 from support.studied import studied
 
-from ema_model.campaign.kinds.discover import tally
-from ema_model.campaign.plan_axes import NEEDS_LOAD, effect_of
+from ema_model.campaign.kinds import tally
+from ema_model.campaign.task import NEEDS_LOAD, effect_of
 from ema_model.discovery import discover
 from ema_model.effects import CATALOGUE
 

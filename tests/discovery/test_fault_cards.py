@@ -14,7 +14,7 @@ from ema_model.discovery.result import Candidate, Change
 from ema_model.discovery.snapshot import assessed
 from ema_model.discovery.words import PAGES, candidates, effect_title, rung_label, rung_title, size, typical
 from ema_model.faults import BY_NAME, CAUSES, vector
-from ema_model.quantities.axes import ROTARY
+from ema_model.quantities import ROTARY
 from ema_model.recordings.measurement import Sensors
 from ema_model.simulation.run import Run, simulate_reference
 

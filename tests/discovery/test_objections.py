@@ -13,7 +13,7 @@ from ema_model.discovery.objections import disagreement
 from ema_model.effects import find
 from ema_model.estimation import Calibrated
 from ema_model.estimation.model_fit import Data
-from ema_model.quantities.axes import ROTARY
+from ema_model.quantities import ROTARY
 
 RANDOM = np.random.default_rng(7)
 N = 4000

@@ -13,7 +13,7 @@ from ema_model.discovery.refit import Trial
 from ema_model.discovery.result import Added, Candidate, effect_title
 from ema_model.discovery.scoring import Evident
 from ema_model.estimation.noise import PIECE, NoiseModel
-from ema_model.quantities.titles import in_sentence
+from ema_model.quantities import in_sentence
 
 _COUNT = 6 * PIECE
 

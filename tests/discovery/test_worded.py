@@ -22,8 +22,7 @@ from ema_model.discovery.words import (
     untold,
 )
 from ema_model.estimation import Calibrated
-from ema_model.quantities.axes import ROTARY, Axes
-from ema_model.quantities.titles import in_sentence
+from ema_model.quantities import ROTARY, Axes, in_sentence
 from emaviz.views.export import export
 
 RAW = re.compile(r"[a-z]+\.[a-z_]+_|cogging_torque|torque_ripple|_Nm|_A\b")

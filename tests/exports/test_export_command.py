@@ -13,8 +13,7 @@ import ema_model as em
 from ema_model.actuator import actuator_text
 from ema_model.effects import Parameter, register
 from ema_model.effects.effect import PLACES
-from ema_model.effects.user.module import generated_module
-from ema_model.effects.user.user_effect import UserEffect
+from ema_model.effects.user.torque import UserEffect, generated_module
 from ema_model.exports import c, fmu
 from ema_model.exports.exported import exported, identifier
 from emaviz.cli import main

@@ -7,9 +7,8 @@ from itertools import combinations, product
 import numpy as np
 import pytest
 
-from ema_model.fleet.block import Block
-from ema_model.fleet.pool import DIFFERENCE, Pool, scatter
-from ema_model.fleet.select import alike, price_of, select, total
+from ema_model.fleet.block import DIFFERENCE, Block, Pool, scatter
+from ema_model.fleet.fit import alike, price_of, select, total
 
 PARAMETERS = 6
 NONE = np.zeros(PARAMETERS)

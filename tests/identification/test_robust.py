@@ -13,7 +13,7 @@ from support.studied import QUICK, studied
 
 from ema_model import faults
 from ema_model.actuator import load_actuator
-from ema_model.campaign.kinds.identify import covered
+from ema_model.campaign.kinds import covered
 from ema_model.commands import command
 from ema_model.errors import InputError
 from ema_model.estimation.least_squares import Descent

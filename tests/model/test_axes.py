@@ -18,12 +18,12 @@ from ema_model.errors import InputError
 from ema_model.estimation.problem import unknowns_of
 from ema_model.models.inverse_dynamics import InverseDynamics
 from ema_model.models.loop_window import cut
-from ema_model.quantities.axes import Axes
+from ema_model.quantities import Axes
 from ema_model.recordings import Measurement
 from ema_model.recordings.health import health
 from ema_model.recordings.read import check_needed, prepared
 from ema_model.simulation.run import Run, finite, run_in_words
-from emaviz.cli.option_values import effects_of
+from emaviz.cli.flow import effects_of
 from emaviz.figures.runs import charts
 
 PROJECT = Path(__file__).parents[2]

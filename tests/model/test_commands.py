@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from ema_model.commands import COMMANDS, Command, Recorded, command
-from ema_model.commands.recorded import between, jumps
+from ema_model.commands.command import between, jumps
 from ema_model.errors import InputError
 
 T = np.linspace(0.0, 1.0, 100_001)

@@ -13,7 +13,7 @@ from ema_model.effects import CATALOGUE
 from ema_model.effects.effect import FAMILIES, STAGES
 from ema_model.effects.presliding_friction import EFFECT as PRESLIDING
 from ema_model.effects.torsional_compliance import EFFECT as COMPLIANCE
-from ema_model.physics.friction import advance_rotor
+from ema_model.physics.equations import advance_rotor
 from ema_model.simulation.run import Run, simulate_monitor, simulate_reference
 
 ACTUATOR = load_actuator()
@@ -86,7 +86,7 @@ def rms(values) -> float:
     return float(np.sqrt(np.mean(np.square(values))))
 
 
-# --- declarations ---------------------------------------------------------------------------------------------------
+# --- declarations -----------------------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("effect", CATALOGUE)
@@ -112,7 +112,7 @@ def test_default_is_the_middle_severity(effect):
     assert declared.parameters[0].default == declared.severities[1]
 
 
-# --- both models ----------------------------------------------------------------------------------------------------
+# --- both models ------------------------------------------------------------------------------------------------------
 
 
 def neutral_at_zero() -> list[str]:
@@ -145,7 +145,7 @@ def test_both_models_show_the_same_change(effect):
     assert rms(three_phases - equivalent) <= 0.2 * rms(three_phases)
 
 
-# --- sensors --------------------------------------------------------------------------------------------------------
+# --- sensors ----------------------------------------------------------------------------------------------------------
 
 
 @each_model
@@ -181,7 +181,7 @@ def test_delay_trails_a_ramp_by_speed_times_delay(delay, model):
     assert np.mean(trailing) == pytest.approx(slope * delay, rel=0.01)
 
 
-# --- friction and the drive -----------------------------------------------------------------------------------------
+# --- friction and the drive -------------------------------------------------------------------------------------------
 
 
 def test_drag_grows_with_the_square_of_speed():
@@ -296,7 +296,7 @@ def test_dead_time_looks_like_resistance():
     assert cosine(dead, resistance) > 0.97 > 0.5 > cosine(dead, inertia)
 
 
-# --- transmission ---------------------------------------------------------------------------------------------------
+# --- transmission -----------------------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize(("stiffness", "mode_Hz"), list(zip(COMPLIANCE.severities, (90.0, 60.0, 30.0))))

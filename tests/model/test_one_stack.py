@@ -71,7 +71,7 @@ def test_an_effect_does_nothing_at_its_neutral_settings(name):
             assert advances(*row, *own, *states) == (*states,)
 
 
-# --- the kernels ----------------------------------------------------------------------------------------------------
+# --- the kernels ------------------------------------------------------------------------------------------------------
 
 
 def population() -> np.ndarray:
@@ -172,7 +172,7 @@ def test_the_librarys_lanes_are_single_runs():
         np.testing.assert_array_equal(lanes[:, lane], monitored(library, effects, demand, HEALTHY[None])[:, 0])
 
 
-# --- which one is taken ---------------------------------------------------------------------------------------------
+# --- which one is taken -----------------------------------------------------------------------------------------------
 
 
 def test_what_the_library_has_is_run_in_it():

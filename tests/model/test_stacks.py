@@ -43,7 +43,7 @@ def assert_same(a, b, tolerance):
         assert np.max(np.abs(a[name] - b[name])) <= tolerance * scale, name
 
 
-# --- composition ----------------------------------------------------------------------------------------------------
+# --- composition ------------------------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("model", MODELS)
@@ -128,7 +128,7 @@ def test_effects_act_at_known_places_with_the_right_arguments(effect):
         assert len(arguments) == expected, f"{effect}.{function.__name__} takes {arguments}"
 
 
-# --- what is hashed -------------------------------------------------------------------------------------------------
+# --- what is hashed ---------------------------------------------------------------------------------------------------
 
 
 def ours(path: Path) -> set[str]:
@@ -165,11 +165,11 @@ def test_kernels_import_nothing_of_ours_that_is_not_hashed():
         assert not outside, f"{path.name} imports {outside}, whose edits the cache would not notice"
     for place in ("physics", "kernels", "effects"):
         inside = {p.name for p in (PACKAGE / place).iterdir() if p.is_dir()} - {"__pycache__"}
-        # A user's effect is named after all that makes it (`effects/user/module.py`).
+        # A user's effect is named after all that makes it (`effects/user/torque.py`).
         assert inside <= {"user"}, "a subfolder is not hashed"
 
 
-# --- caches, processes, threads -------------------------------------------------------------------------------------
+# --- caches, processes, threads ---------------------------------------------------------------------------------------
 
 # The kernel that is compiled soonest stands for all: they are composed, hashed and kept by the same means.
 PROGRAM = """

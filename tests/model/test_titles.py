@@ -9,7 +9,7 @@ import pytest
 from ema_model.actuator import load_actuator
 from ema_model.commands import COMMANDS
 from ema_model.effects import CATALOGUE
-from ema_model.quantities.titles import in_sentence, labelled, parameter_title, unit_of
+from ema_model.quantities import in_sentence, labelled, parameter_title, unit_of
 from ema_model.recordings import SIGNALS
 
 

@@ -7,7 +7,7 @@ import math
 import pytest
 
 from ema_model.effects.user import parse
-from ema_model.effects.user.beginnings import beginnings
+from ema_model.effects.user.expression import beginnings
 
 TORQUE = 0.003
 SIZES = {"t": 0.5, "theta": 2.0, "omega": 90.0, "q": 2.0, "user": 0.005}

@@ -17,7 +17,7 @@ from ema_model.errors import InputError
 from ema_model.recordings.read import read_measurement
 from ema_model.simulation.run import Run, simulate_monitor
 from emaviz.cli import main
-from emaviz.cli.option_values import split_at_commas
+from emaviz.cli.flow import split_at_commas
 
 OWN = """
 [effects.user_torque]
@@ -178,7 +178,7 @@ def test_the_same_effect_twice_is_refused(own):
         load_actuator(own)
 
 
-# --- the command line -----------------------------------------------------------------------------------------------
+# --- the command line -------------------------------------------------------------------------------------------------
 
 
 def simulated(tmp_path, *effects: str) -> np.ndarray:

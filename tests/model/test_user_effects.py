@@ -45,7 +45,7 @@ def points(n: int = 300) -> list[np.ndarray]:
     return [np.append(rng.uniform(-high, high, n), 0.0) for high in (40.0, 900.0, 25.0, 0.5)]
 
 
-# --- values ---------------------------------------------------------------------------------------------------------
+# --- values -----------------------------------------------------------------------------------------------------------
 
 VALUES: list[tuple[str, Callable[..., np.ndarray]]] = [
     ("a*sin(7*theta + b)/2", lambda x, w, q, u, a, b: a * np.sin(7 * x + b) / 2),
@@ -109,7 +109,7 @@ def test_curve_over_a_turn_of_the_motor_repeats(parts):
     np.testing.assert_allclose(torques(effect, *at, *values), expected, rtol=1e-6, atol=1e-6)
 
 
-# --- parameters and registration ------------------------------------------------------------------------------------
+# --- parameters and registration --------------------------------------------------------------------------------------
 
 
 def test_parameters_their_ranges_and_defaults():
@@ -162,7 +162,7 @@ def test_wrong_curves_are_refused(arguments, message):
         torque_curve(*arguments)
 
 
-# --- in the models --------------------------------------------------------------------------------------------------
+# --- in the models ----------------------------------------------------------------------------------------------------
 
 
 def currents(effects: dict, simulate: Callable[..., Measurement] = simulate_monitor) -> np.ndarray:

@@ -16,10 +16,12 @@ from ema_model.commands import Recorded, command
 from ema_model.errors import InputError
 from ema_model.faults import vector
 from ema_model.physics import elementary
-from ema_model.physics.backlash import advance_play
-from ema_model.physics.friction import advance_reversing_rotor, advance_rotor, borello_friction
-from ema_model.physics.phases import (
+from ema_model.physics.equations import (
+    advance_play,
+    advance_reversing_rotor,
+    advance_rotor,
     air_gap,
+    borello_friction,
     equivalent_current,
     flux_factor,
     flux_harmonics,
@@ -36,7 +38,7 @@ each_model = pytest.mark.parametrize("model", MODELS.values(), ids=MODELS)
 HOLD = command("step", {"initial_rad": 0.0, "final_rad": 0.0})
 
 
-# --- stick ----------------------------------------------------------------------------------------------------------
+# --- stick ------------------------------------------------------------------------------------------------------------
 
 
 @each_model
@@ -104,7 +106,7 @@ def test_a_reversal_is_when_the_speed_is_zero(early):
     assert speed_after(start, 8) == pytest.approx(away * (8 * dt + start / braking), rel=1e-9)
 
 
-# --- play -----------------------------------------------------------------------------------------------------------
+# --- play -------------------------------------------------------------------------------------------------------------
 
 
 @each_model
@@ -146,7 +148,7 @@ def test_play_operator(inputs, half):
         play = after
 
 
-# --- end stops ------------------------------------------------------------------------------------------------------
+# --- end stops --------------------------------------------------------------------------------------------------------
 
 
 @each_model
@@ -168,7 +170,7 @@ def test_end_stop_holds_and_stops(model, sign):
     assert abs(s["user_position_rad"][-1]) < 2e-4
 
 
-# --- limits of the controller and the motor -------------------------------------------------------------------------
+# --- limits of the controller and the motor ---------------------------------------------------------------------------
 
 
 def test_current_and_speed_limits_hold():
@@ -181,7 +183,7 @@ def test_current_and_speed_limits_hold():
         assert np.max(model(step, slow)["motor_speed_rad_s"]) == pytest.approx(100.0, rel=0.02)
 
 
-# --- step size ------------------------------------------------------------------------------------------------------
+# --- step size --------------------------------------------------------------------------------------------------------
 
 
 def test_smaller_steps_converge():
@@ -197,7 +199,7 @@ def test_smaller_steps_converge():
         assert changes[-1] < 0.7 * changes[0], (model.__name__, changes)
 
 
-# --- elementary functions -------------------------------------------------------------------------------------------
+# --- elementary functions ---------------------------------------------------------------------------------------------
 
 
 @numba.njit
@@ -277,7 +279,7 @@ def test_clamp_and_sign_of_odd_values():
     assert [elementary.sign(x) for x in (-2.0, -0.0, 0.0, 3.0)] == [-1.0, 0.0, 0.0, 1.0]
 
 
-# --- phases ---------------------------------------------------------------------------------------------------------
+# --- phases -----------------------------------------------------------------------------------------------------------
 
 unit = st.floats(0.0, 1.0)
 angle = st.floats(-math.pi, math.pi)

@@ -13,10 +13,8 @@ from ema_model.actuator import load_actuator
 from ema_model.challenges import challenges, folder
 from ema_model.challenges.truth import read_toml
 from ema_model.errors import InputError
-from ema_model.fleet.compare import compare_units
-from ema_model.fleet.folders import units_in
-from ema_model.practice import make_and_reveal
-from ema_model.practice.kinds import KINDS
+from ema_model.fleet.compare import compare_units, units_in
+from ema_model.practice import KINDS
 from ema_model.recordings import read
 from ema_model.simulated_lives import drawn, worn_life
 from ema_model.tracking.flights import flights_in
@@ -32,7 +30,7 @@ def short(monkeypatch):
     """Truths with less to record."""
     told = {"one_life": LIFE | {"flights": 2}, "six_siblings": read_toml(folder() / "truth" / "six_siblings.toml")}
     told["six_siblings"] |= {"units": 2, "differences": told["six_siblings"]["differences"][:1]}
-    monkeypatch.setattr(make_and_reveal, "read_toml", lambda path: told[path.stem])
+    monkeypatch.setattr(practice, "read_toml", lambda path: told[path.stem])
 
 
 def test_they_ship_beside_the_others_and_have_no_recordings():

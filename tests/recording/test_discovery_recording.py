@@ -9,7 +9,7 @@ from rerun.chunk import RrdReader
 from support.discovered import with_cogging, with_unknown
 
 from ema_model.errors import InputError
-from ema_model.quantities.numbers import number
+from ema_model.quantities import number
 from emaviz.recording import read
 from emaviz.recording.discovery import write_discovery
 

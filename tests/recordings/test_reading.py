@@ -11,7 +11,7 @@ import pyarrow.parquet as pq
 import pytest
 
 from ema_model.errors import InputError
-from ema_model.quantities.axes import lookalikes
+from ema_model.quantities import lookalikes
 from ema_model.recordings import SIGNALS, Measurement, check_needed, write_measurement
 from ema_model.recordings.formats import WRITTEN
 from ema_model.recordings.health import health

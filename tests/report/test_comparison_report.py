@@ -17,11 +17,10 @@ from ema_model.comparison.result import Comparison, SignalError, held_out
 from ema_model.comparison.verdict import judge
 from ema_model.errors import InputError
 from ema_model.recordings.health import Finding, Health
-from emaviz.page.compare.result import numbers
+from emaviz.page.compare_result import numbers
 from emaviz.recording.writer import written
-from emaviz.report.html_document import Figures
 from emaviz.views.comparison import VIEW
-from emaviz.views.export import export, markup
+from emaviz.views.export import Figures, export, markup
 
 HOSTILE = '</script><script>window.bad = 1</script><img src="x" onerror="window.bad = 2">&amp;'
 

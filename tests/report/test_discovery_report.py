@@ -15,7 +15,7 @@ from ema_model.discovery import Discovery
 from ema_model.discovery.result import Experiment
 from ema_model.discovery.words import value
 from ema_model.errors import InputError
-from ema_model.quantities.numbers import number
+from ema_model.quantities import number
 from emaviz.figures import discovery
 from emaviz.text.html import mathml
 from emaviz.views.export import export

@@ -11,12 +11,12 @@ import pytest
 
 from ema_model.actuator import load_actuator
 from ema_model.effects import CATALOGUE
-from ema_model.effects.user.entries import KEYS
-from ema_model.quantities.variables import variable_title
+from ema_model.effects.user.torque import KEYS
+from ema_model.quantities import variable_title
 from ema_model.simulation.run import simulate_monitor
 from ema_model.simulation.with_effect import RUNS, EffectRuns, WithEffect, few_periods
 from emaviz.figures.discovery import SEVERITIES, picture, pictures
-from emaviz.report.effects import write_effects_reference
+from emaviz.views.effects import write_effects_reference
 
 ACTUATOR = load_actuator()
 EXACT = {  # what the residual is proportional to, in motion

@@ -11,8 +11,7 @@ import pytest
 from ema_model.actuator import load_actuator
 from ema_model.errors import InputError
 from ema_model.recordings import read
-from ema_model.simulated_fleets import RUNS, draw, recorded
-from ema_model.simulated_fleets.fleet import TRUTH, own, read_truth, told, write
+from ema_model.simulated_fleets import RUNS, TRUTH, draw, own, read_truth, recorded, told, write
 
 ACTUATOR = load_actuator()
 

@@ -17,7 +17,7 @@ from ema_model.comparison.regions import Region
 from ema_model.comparison.residuals import Residuals, join
 from ema_model.comparison.result import Compared, Comparison, SignalError
 from ema_model.estimation.calibrate import Calibrated, Calibration
-from ema_model.quantities.titles import unit_of
+from ema_model.quantities import unit_of
 from ema_model.recordings.health import health
 from ema_model.recordings.measurement import Sensors
 from ema_model.simulation.run import Run, simulate_monitor, simulate_reference

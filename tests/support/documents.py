@@ -8,7 +8,7 @@ from typing import Any
 
 import msgspec
 
-from emaviz.cli.documents import HeadJson
+from emaviz.cli.output import HeadJson
 from emaviz.cli.verbs.schema import verbs_with_documents
 
 

@@ -11,7 +11,7 @@ from ema_model.actuator.parameters import path_inside
 from ema_model.comparison.criteria import BAND
 from ema_model.comparison.verdict import most_of_floor
 from ema_model.effects import CATALOGUE
-from ema_model.quantities.numbers import HALF_90
+from ema_model.quantities import HALF_90
 from support.foreign_rigs import actuator_of
 
 SHOWABLE = 3.0  # `change_over_floor` of what a recording must tell; below 1 nobody can, between them hardly

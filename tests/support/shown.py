@@ -7,7 +7,7 @@ import re
 from collections.abc import Iterable, Mapping
 from typing import Any
 
-from ema_model.quantities.numbers import number, with_uncertainty
+from ema_model.quantities import number, with_uncertainty
 
 _TIMES = re.compile(
     r"(?<!of )(?<![\d.])([\d.]+)(?: (?:to|→|→ ≈) ([\d.]+))? "

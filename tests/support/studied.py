@@ -14,7 +14,7 @@ from typing import Any
 
 from ema_model.campaign import Store, load_plan, run_plan, scheduler
 from ema_model.campaign.kinds import KINDS
-from ema_model.campaign.result import Campaign, report_text
+from ema_model.campaign.store import Campaign, report_text
 
 QUICK = os.environ.get("EMAVIZ_STUDY_QUICK") == "1"
 

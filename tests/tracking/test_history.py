@@ -9,11 +9,9 @@ import pytest
 from support.flights import flights
 
 from ema_model.errors import InputError
-from ema_model.tracking.evidence import LEAST_FLIGHTS
-from ema_model.tracking.history import Came, History
-from ema_model.tracking.track import track
-from ema_model.tracking.words import headline, hindsight
-from emaviz.figures import tracking
+from ema_model.tracking.track import Came, History, headline, hindsight, track
+from ema_model.tracking.trends import LEAST_FLIGHTS
+from emaviz.views import tracking
 
 ALL = flights(0.004 * np.arange(120))
 AT = 0.4  # k1, which is there after flight 100 or so

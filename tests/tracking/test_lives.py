@@ -13,8 +13,7 @@ from ema_model.estimation.problem import to_vector
 from ema_model.identification.fit import refine, setting
 from ema_model.identification.search import Objective
 from ema_model.identification.uncertainty import uncertainty
-from ema_model.simulated_lives import LAWS, drawn, healthy_life, recorded, worn_life
-from ema_model.simulated_lives.life import base_of, unit_of
+from ema_model.simulated_lives import LAWS, base_of, drawn, healthy_life, recorded, unit_of, worn_life
 
 
 def worn_k(life):

@@ -8,9 +8,8 @@ from support.flights import flights
 
 from ema_model import faults
 from ema_model.estimation.problem import to_vector
-from ema_model.simulated_lives import drawn, worn_life
-from ema_model.simulated_lives.life import WORN_AT, accuracy, base_of
-from ema_model.tracking.series import Unit, growth
+from ema_model.simulated_lives import WORN_AT, accuracy, base_of, drawn, worn_life
+from ema_model.tracking.flights import Unit, growth
 from ema_model.tracking.track import Tracker, track
 
 HEALTHY = to_vector(faults.HEALTHY)

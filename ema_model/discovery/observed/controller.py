@@ -22,7 +22,7 @@ from ema_model.actuator import Actuator
 from ema_model.discovery.criteria import GAIN_APART, LATE_SAMPLES, LAW_APART, LAW_HOLDS
 from ema_model.models import Model
 from ema_model.models.measured_motion import Motion, motion_of
-from ema_model.quantities.numbers import HALF_90
+from ema_model.quantities import HALF_90
 from ema_model.recordings import Measurement
 from ema_model.result import NAME, as_named
 

@@ -19,8 +19,7 @@ from numpy.typing import NDArray
 from ema_model.actuator import Actuator
 from ema_model.comparison.explain import Order, orders, pitches
 from ema_model.models.measured_motion import motion_of
-from ema_model.quantities.axes import of_signal
-from ema_model.quantities.numbers import amount, number
+from ema_model.quantities import amount, number, of_signal
 from ema_model.recordings import Measurement
 from ema_model.recordings.noise import sample_noise
 

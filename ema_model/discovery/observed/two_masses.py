@@ -23,7 +23,7 @@ from msgspec import Meta
 from numpy.typing import NDArray
 
 from ema_model.actuator import Actuator
-from ema_model.quantities.numbers import number
+from ema_model.quantities import number
 from ema_model.recordings import Measurement
 
 Array = NDArray[np.float64]

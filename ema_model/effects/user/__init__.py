@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-from ema_model.effects.user.curve import torque_curve
 from ema_model.effects.user.expression import Expression, parse
-from ema_model.effects.user.torque import user_torque
-from ema_model.effects.user.user_effect import UserEffect
+from ema_model.effects.user.torque import UserEffect, torque_curve, user_torque
 
 __all__ = ["Expression", "UserEffect", "parse", "torque_curve", "user_torque"]

@@ -18,14 +18,22 @@ import pyarrow.csv as pc
 
 from ema_model.errors import InputError, quoted
 from ema_model.files.opened import LINE_BYTES, listed, megabytes, refusal, shown
-from ema_model.quantities.axes import SIGNALS
-from ema_model.quantities.unit_conversion import find_unit
+from ema_model.quantities import SIGNALS
 from ema_model.recordings.column_names import is_time, readings
 from ema_model.recordings.formats.arrow import as_numpy, mask
 from ema_model.recordings.formats.channels import beside_time, tokens, with_unit
-from ema_model.recordings.formats.clocks import Clocks, between, covered, is_state, main_clock, rule
-from ema_model.recordings.formats.format import Array, Columns, Format, check_size
-from ema_model.recordings.formats.stamps import is_stamp, seconds
+from ema_model.recordings.formats.format import (
+    Array,
+    Clocks,
+    Columns,
+    Format,
+    between,
+    check_size,
+    covered,
+    is_state,
+    main_clock,
+    rule,
+)
 from ema_model.recordings.formats.text_layout import (
     SEPARATORS,
     Head,
@@ -33,10 +41,13 @@ from ema_model.recordings.formats.text_layout import (
     Layout,
     find_layout,
     is_number,
+    is_stamp,
     lines_of,
     read_head,
+    seconds,
     split,
 )
+from ema_model.recordings.units import find_unit
 
 # --- a text as UTF-8, whatever it is stored in ------------------------------------------------------------------------
 
@@ -343,7 +354,7 @@ def on_one_clock(
     found: Mapping[int, Array | None],
     strict: bool,
 ) -> tuple[dict[str, Array], list[str], Clocks | None]:
-    """The columns on the time with the most samples, see `clocks`; what was done, in words and by column.
+    """The columns on the time with the most samples, see `format`; what was done, in words and by column.
 
     titles: of the file's columns; clocks: by column, that of its time; places: a name's column; found: numbers by
     column, each as long as it goes; strict: only where all were recorded.

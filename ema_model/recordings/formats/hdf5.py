@@ -14,8 +14,7 @@ import numpy as np
 
 from ema_model.errors import InputError
 from ema_model.files.opened import ARRAYS, listed, refusal, shown
-from ema_model.recordings.formats.channels import Channel, Log, Matrix, NoLog, in_columns, without_ones
-from ema_model.recordings.formats.logs import log_format
+from ema_model.recordings.formats.channels import Channel, Log, Matrix, NoLog, in_columns, log_format, without_ones
 
 _DEEPEST = 8
 _UNIT = ("units", "unit", "Unit", "Units", "UNIT")

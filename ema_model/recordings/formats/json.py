@@ -13,8 +13,7 @@ import numpy as np
 
 from ema_model.files.opened import ARRAYS, RUNS, shown
 from ema_model.recordings.column_names import is_time
-from ema_model.recordings.formats.channels import RUN, Channel, Log, Matrix, NoLog, in_columns
-from ema_model.recordings.formats.logs import log_format
+from ema_model.recordings.formats.channels import RUN, Channel, Log, Matrix, NoLog, in_columns, log_format
 
 # --- JSON logs --------------------------------------------------------------------------------------------------------
 # Records, one a line or in a list, or columns as lists, at any depth; single numbers are parameters.

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ema_model.files.opened import ARRAYS, megabytes, refusal, shown
-from ema_model.quantities.axes import SIGNALS
+from ema_model.quantities import SIGNALS
 from ema_model.recordings.formats import hdf5
 from ema_model.recordings.formats.channels import (
     Channel,

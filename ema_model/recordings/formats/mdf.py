@@ -8,8 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from ema_model.recordings.formats.channels import Channel, Log, broken_file
-from ema_model.recordings.formats.logs import log_format
+from ema_model.recordings.formats.channels import Channel, Log, broken_file, log_format
 
 _MASTERS = (2, 3)  # kinds of channels that are their group's time
 

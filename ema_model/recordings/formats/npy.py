@@ -10,8 +10,16 @@ from typing import Any
 import numpy as np
 
 from ema_model.files.opened import refusal, shown
-from ema_model.recordings.formats.channels import Channel, Log, Matrix, NoLog, broken_file, in_columns, without_ones
-from ema_model.recordings.formats.logs import log_format
+from ema_model.recordings.formats.channels import (
+    Channel,
+    Log,
+    Matrix,
+    NoLog,
+    broken_file,
+    in_columns,
+    log_format,
+    without_ones,
+)
 
 
 @contextmanager

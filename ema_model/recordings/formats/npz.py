@@ -15,11 +15,12 @@ from numpy.typing import NDArray
 
 from ema_model.errors import InputError
 from ema_model.files.opened import ARRAYS, Damaged, Member, Refused, SafeZip, listed, opened_zip, refusal, shown
-from ema_model.quantities.axes import SIGNALS
+from ema_model.quantities import SIGNALS
 from ema_model.recordings.column_names import is_time
 from ema_model.recordings.formats.channels import (
     Channel,
     Log,
+    check_lengths,
     column_names_of,
     offered,
     taken,
@@ -115,15 +116,6 @@ def take(
     aside = _aside(kinds)
     notes = (f"left aside, as they are no columns of numbers: {listed(aside)}",) if aside else ()
     return Columns(columns, lambda row: f"sample {row + 1}", notes)
-
-
-def check_lengths(path: str, columns: Mapping[str, Array]) -> None:
-    """Raises InputError unless all have the length of the first."""
-    names = list(columns)
-    for name in names[1:]:
-        if columns[name].size != columns[names[0]].size:
-            found = f"{columns[name].size} values where {shown(names[0])!r} has {columns[names[0]].size}"
-            raise refusal(path, f"column {shown(name)!r} has {found}; one length is expected, cut or resample it")
 
 
 def put_together(channels: Sequence[Channel], aside: Sequence[str]) -> Log | None:

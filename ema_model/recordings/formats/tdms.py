@@ -8,8 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from ema_model.recordings.formats.channels import Array, Channel, Log, broken_file
-from ema_model.recordings.formats.logs import log_format
+from ema_model.recordings.formats.channels import Array, Channel, Log, broken_file, log_format
 
 _INCREMENT, _START, _BEGINS = "wf_increment", "wf_start_offset", "wf_start_time"
 _UNITS = ("unit_string", "NI_UnitDescription", "unit", "Unit")

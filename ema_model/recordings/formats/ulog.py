@@ -6,8 +6,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any
 
-from ema_model.recordings.formats.channels import Channel, Log, broken_file
-from ema_model.recordings.formats.logs import log_format
+from ema_model.recordings.formats.channels import Channel, Log, broken_file, log_format
 
 _STAMP = "timestamp"
 _MICROSECOND = 1e-6

@@ -1,4 +1,4 @@
-"""What `emaviz` can be asked: each file or folder is one verb.
+"""What `emaviz` can be asked: each file is one verb.
 
 It has `HELP`, its `PLACE` in the list, `add_arguments(parser)` and `run(arguments)`.
 """

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from ema_model.campaign import Status
     from ema_model.campaign.plan import Plan
     from emaviz.cli import output
-    from emaviz.cli.documents import PlannedJson
+    from emaviz.cli.output import PlannedJson
 
 HELP = "compute the many tasks of a plan, in processes or on a Dask cluster; status and report of one"
 PLACE = 11
@@ -57,9 +57,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def documents() -> tuple[type, ...]:
     """What --json holds: of a campaign, and of what one would compute."""
-    from ema_model.campaign.result import Campaign
+    from ema_model.campaign.store import Campaign
     from ema_model.result import json_type
-    from emaviz.cli.documents import InterruptedCampaignJson, PlannedJson
+    from emaviz.cli.output import InterruptedCampaignJson, PlannedJson
 
     return (json_type(Campaign, InterruptedCampaignJson), PlannedJson)
 
@@ -83,7 +83,7 @@ def run(arguments: argparse.Namespace) -> int:
 
 def _run(plan: Plan, arguments: argparse.Namespace) -> int:
     from ema_model.campaign import Store, run_plan, scheduler
-    from ema_model.campaign.result import Campaign, interrupted
+    from ema_model.campaign.store import Campaign, interrupted
     from emaviz.cli import output
 
     progress = output.Progress(arguments)
@@ -157,7 +157,7 @@ def _dry_run(plan: Plan, arguments: argparse.Namespace) -> int:
 
 def _status(arguments: argparse.Namespace) -> int:
     from ema_model.campaign import Store
-    from ema_model.campaign.result import Campaign, progress_table
+    from ema_model.campaign.store import Campaign, progress_table
     from emaviz.cli import output
 
     found = Campaign(Store(arguments.folder))
@@ -168,7 +168,7 @@ def _status(arguments: argparse.Namespace) -> int:
 
 def _report(arguments: argparse.Namespace) -> int:
     from ema_model.campaign import Store
-    from ema_model.campaign.result import Campaign, report_text
+    from ema_model.campaign.store import Campaign, report_text
     from emaviz.cli import output
 
     found = Campaign(Store(arguments.folder))

@@ -50,8 +50,8 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def _write(one: Challenge, where: Path, arguments: argparse.Namespace) -> None:
+    from ema_model import practice
     from ema_model.challenges.challenge import EFFECTS
-    from ema_model.practice import make_and_reveal
     from emaviz.cli import output
 
     if one.kind == EFFECTS:
@@ -59,10 +59,10 @@ def _write(one: Challenge, where: Path, arguments: argparse.Namespace) -> None:
     else:
         progress = output.Progress(arguments)
         try:
-            make_and_reveal.make(one, where, progress.show)
+            practice.make(one, where, progress.show)
         finally:
             progress.done()
-        command = make_and_reveal.command(one, str(where))
+        command = practice.command(one, str(where))
     print(f"{one.title}\n\n{one.story}\n\nwritten to {where}; go on with\n  {command}")
 
 
@@ -84,9 +84,9 @@ def _answer(one: Challenge) -> list[str]:
     from ema_model.challenges.challenge import EFFECTS, folder
 
     if one.kind != EFFECTS:
-        from ema_model.practice import make_and_reveal
+        from ema_model import practice
 
-        return list(make_and_reveal.reveal(one).lines)
+        return list(practice.reveal(one).lines)
     from ema_model.challenges.truth import read_truth
 
     return [read_truth(folder() / "truth" / f"{one.name}.toml").answer]

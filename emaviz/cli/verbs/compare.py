@@ -54,16 +54,14 @@ def run(arguments: argparse.Namespace) -> int:
     """Compares, and of units what they differ in."""
     if arguments.save_actuator and not arguments.calibrate:
         raise InputError("--save-actuator writes what the calibration found; leave --no-calibrate out")
-    from emaviz.cli import flow, option_values
+    from emaviz.cli import flow
 
-    actuator = option_values.actuator_of(arguments)
+    actuator = flow.actuator_of(arguments)
     if arguments.by or arguments.unit:
-        from emaviz.cli import by_unit
-
-        return by_unit.run(arguments, actuator)
-    k, weights = option_values.faults_of(arguments, actuator.faults), option_values.weights_of(arguments.signals)
-    effects = option_values.effects_of(arguments, actuator.axes)
-    to_fit = option_values.effects_to_fit(arguments) if arguments.calibrate else []
+        return flow.run_by_unit(arguments, actuator)
+    k, weights = flow.faults_of(arguments, actuator.faults), flow.weights_of(arguments.signals)
+    effects = flow.effects_of(arguments, actuator.axes)
+    to_fit = flow.effects_to_fit(arguments) if arguments.calibrate else []
 
     def compute(fitted: list[Measurement], held: list[Measurement], progress: output.Progress) -> flow.Answer:
         from ema_model.comparison import compare  # takes a second: recordings are refused before

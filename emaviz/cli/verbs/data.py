@@ -10,7 +10,7 @@ from ema_model.errors import InputError
 from emaviz.cli import options
 
 if TYPE_CHECKING:
-    from emaviz.cli.documents import DataJson
+    from emaviz.cli.output import DataJson
 
 HELP = "say where the benchmarks' recordings of others come from, and make them of a local copy"
 PLACE = 12
@@ -30,7 +30,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def documents() -> tuple[type, ...]:
     """What --json holds."""
-    from emaviz.cli.documents import DataJson
+    from emaviz.cli.output import DataJson
 
     return (DataJson,)
 

@@ -35,27 +35,25 @@ def documents() -> tuple[type, ...]:
     from ema_model.discovery import Discovery
     from ema_model.fleet.discovery import UnitsDiscovered
     from ema_model.result import json_type
-    from emaviz.cli.documents import SavedModelJson
+    from emaviz.cli.output import SavedModelJson
 
     return (json_type(Discovery, SavedModelJson), json_type(UnitsDiscovered))
 
 
 def run(arguments: argparse.Namespace) -> int:
     """Discovers, and of units what they lack; once interrupted, what was found so far."""
-    from emaviz.cli import flow, option_values
+    from emaviz.cli import flow
 
-    actuator = option_values.actuator_of(arguments)
+    actuator = flow.actuator_of(arguments)
     signals = _CURRENT_ONLY if arguments.signals == "current" else None
     if arguments.by or arguments.unit:
-        from emaviz.cli import by_unit
-
-        return by_unit.run_discovery(arguments, actuator, signals)
+        return flow.run_discovery(arguments, actuator, signals)
 
     def compute(fitted: list[Measurement], held: list[Measurement], progress: output.Progress) -> flow.Answer:
         # These take a second: recordings are refused before.
         from ema_model.discovery import discover, verified
         from ema_model.discovery.words import verification
-        from ema_model.quantities.numbers import plain
+        from ema_model.quantities import plain
 
         with PartialAnswer() as partial:
             found = discover(

@@ -12,7 +12,7 @@ from emaviz.cli.options import add_json, effect_name
 
 if TYPE_CHECKING:
     from ema_model.effects import Effect, Parameter
-    from emaviz.cli.documents import EffectJson, EffectParameterFactsJson
+    from emaviz.cli.output import EffectJson, EffectParameterFactsJson
 
 HELP = "list the physical effects that can be added to the models, or explain one"
 PLACE = 8
@@ -29,7 +29,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def documents() -> tuple[type, ...]:
     """What --json holds."""
-    from emaviz.cli.documents import EffectsJson
+    from emaviz.cli.output import EffectsJson
 
     return (EffectsJson,)
 
@@ -37,7 +37,7 @@ def documents() -> tuple[type, ...]:
 def run(arguments: argparse.Namespace) -> int:
     """Prints the list or the explanation, or writes the pages."""
     from ema_model.effects import CATALOGUE, find
-    from ema_model.effects.user.entries import KEYS, TITLES
+    from ema_model.effects.user.torque import KEYS, TITLES
     from emaviz.cli.output import write_json
 
     if arguments.name in KEYS:
@@ -46,7 +46,7 @@ def run(arguments: argparse.Namespace) -> int:
         return 0
     chosen = [find(arguments.name)] if arguments.name else list(CATALOGUE.values())
     if arguments.html:
-        from emaviz.report.effects import write_effects_reference
+        from emaviz.views.effects import write_effects_reference
 
         print(f"{arguments.html}: {len(write_effects_reference(arguments.html))} pages; begin with index.html")
     elif arguments.name:
@@ -64,7 +64,7 @@ def run(arguments: argparse.Namespace) -> int:
 
 def explain_users(name: str) -> str:
     """What an effect of the user's own is made of, for a terminal."""
-    from ema_model.effects.user.entries import KEYS, TITLES
+    from ema_model.effects.user.torque import KEYS, TITLES
 
     width = max(map(len, KEYS[name]))
     entries = [f"  {key:{width}}  {meaning}" for key, meaning in KEYS[name].items()]
@@ -72,7 +72,7 @@ def explain_users(name: str) -> str:
 
 
 def _users_facts(name: str) -> EffectJson:
-    from ema_model.effects.user.entries import KEYS, TITLES
+    from ema_model.effects.user.torque import KEYS, TITLES
 
     return {"name": name, "title": TITLES[name], "keys": dict(KEYS[name])}
 
@@ -80,7 +80,7 @@ def _users_facts(name: str) -> EffectJson:
 def explain(effect: Effect) -> str:
     """Everything about an effect, for a terminal."""
     from ema_model.effects.effect import FAMILIES
-    from ema_model.quantities.variables import VARIABLES
+    from ema_model.quantities import VARIABLES
 
     lines = [effect.title, f"  {effect.equation}", "", textwrap.fill(effect.explanation, 92), "", "Parameters"]
     width = max(len(p.name) for p in effect.parameters)
@@ -104,7 +104,7 @@ def explain(effect: Effect) -> str:
 
 def _on_a_linear_axis(parameter: Parameter) -> str:
     """What it is called where the side that it sits at is linear, and its range there."""
-    from ema_model.quantities.axes import Axes
+    from ema_model.quantities import Axes
 
     there = parameter.on(Axes("linear", "linear"))
     if there.unit == parameter.unit:

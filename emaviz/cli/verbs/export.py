@@ -37,7 +37,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def documents() -> tuple[type, ...]:
     """What --json holds."""
-    from ema_model.exports.result import Export
+    from ema_model.exports.replay import Export
     from ema_model.result import json_type
 
     return (json_type(Export),)
@@ -51,13 +51,13 @@ def run(arguments: argparse.Namespace) -> int:
     from ema_model.actuator import load_actuator
     from ema_model.exports.export import export
     from ema_model.recordings.recording_set import files_of
-    from emaviz.cli import flow, option_values, output
+    from emaviz.cli import flow, output
 
     actuator = load_actuator(arguments.actuator)
     progress = output.Progress(arguments)
     try:
         names = [name for text in arguments.files for name in files_of(text)]
-        recordings = option_values.read_files(names, arguments, actuator, progress)
+        recordings = flow.read_files(names, arguments, actuator, progress)
         result = export(
             actuator,
             arguments.to,

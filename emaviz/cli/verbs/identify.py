@@ -58,19 +58,19 @@ def documents() -> tuple[type, ...]:
 def run(arguments: argparse.Namespace) -> int:
     """Identifies; once interrupted, the best so far."""
     from ema_model.actuator.file import check_represents
-    from emaviz.cli import flow, option_values
+    from emaviz.cli import flow
 
-    actuator = option_values.actuator_of(arguments)
-    effects = option_values.effects_of(arguments, actuator.axes)
+    actuator = flow.actuator_of(arguments)
+    effects = flow.effects_of(arguments, actuator.axes)
     for name in effects:
         check_represents(actuator, name)
-    to_fit = option_values.effects_to_fit(arguments) if arguments.files else []
+    to_fit = flow.effects_to_fit(arguments) if arguments.files else []
     given_values = {name: settings for name, settings in effects.items() if name not in to_fit}
     actuator = replace(actuator, effects={**actuator.effects, **given_values})
-    truth = option_values.faults_of(arguments) if arguments.fault or not arguments.files else None
+    truth = flow.faults_of(arguments) if arguments.fault or not arguments.files else None
 
     def read(*of: Any) -> tuple[list[Measurement], list[Measurement]]:
-        fitted, held = option_values.read_set(*of)
+        fitted, held = flow.read_set(*of)
         return fitted or [_simulated(arguments, actuator, truth)], held
 
     def compute(fitted: list[Measurement], held: list[Measurement], progress: output.Progress) -> flow.Answer:
@@ -156,11 +156,11 @@ def _simulated(arguments: argparse.Namespace, actuator: Actuator, truth: np.ndar
     assert truth is not None
     from ema_model.recordings.measurement import Sensors
     from ema_model.simulation.plant import simulated
-    from emaviz.cli import option_values
+    from emaviz.cli import flow
 
     sensors = Sensors(arguments.noise_current, arguments.encoder_bits)
     try:
-        clean = simulated(option_values.run_of(arguments, actuator), actuator, truth, arguments.fitness)
+        clean = simulated(flow.run_of(arguments, actuator), actuator, truth, arguments.fitness)
     except FloatingPointError as error:
         raise InputError(str(error)) from None
     return sensors.record(clean, arguments.seed)

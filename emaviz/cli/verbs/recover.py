@@ -10,7 +10,7 @@ from ema_model.errors import InputError
 from emaviz.cli import options
 
 if TYPE_CHECKING:
-    from emaviz.cli.documents import RecoveredJson
+    from emaviz.cli.output import RecoveredJson
 
 HELP = "make a whole recording of one that was cut off (FILE.part)"
 PLACE = 10
@@ -28,7 +28,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def documents() -> tuple[type, ...]:
     """What --json holds."""
-    from emaviz.cli.documents import RecoveredJson
+    from emaviz.cli.output import RecoveredJson
 
     return (RecoveredJson,)
 

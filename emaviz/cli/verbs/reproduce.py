@@ -42,7 +42,7 @@ def run(arguments: argparse.Namespace) -> int:
     from ema_model.actuator import load_actuator
     from ema_model.campaign import Store, load_plan, run_plan, scheduler
     from ema_model.campaign.plan import plan_path
-    from ema_model.campaign.result import interrupted
+    from ema_model.campaign.store import interrupted
     from ema_model.campaign.thesis import Evaluation, drawn
     from ema_model.campaign.thesis_words import aligned, answer, short_table
     from emaviz.cli import output

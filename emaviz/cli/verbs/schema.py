@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 import argparse
-import importlib
 import json
 from typing import Any
 
 from ema_model.errors import InputError, did_you_mean, quoted
-from ema_model.members import names
 from emaviz.cli import COMMANDS
-from emaviz.cli.analysis import verb_of
+from emaviz.cli.parser import verb_of
 
 HELP = "print what the fields of a command's --json mean, as JSON Schema"
 PLACE = 14
@@ -43,9 +41,8 @@ def verbs_with_documents() -> dict[str, Any]:
     found = {}
     for name in COMMANDS:
         verb = verb_of(name)
-        if hasattr(verb, "__path__"):
-            inner = {one: importlib.import_module(f"{verb.__name__}.{one}") for one in names(verb.__name__)}
-            found |= {f"{name} {one}": module for one, module in inner.items()}
+        if hasattr(verb, "VERBS"):
+            found |= {f"{name} {inner}": one for inner, one in verb.VERBS.items()}
         else:
             found[name] = verb
     return {name: verb for name, verb in found.items() if hasattr(verb, "documents")}
@@ -55,7 +52,7 @@ def schema_of(name: str, verb: Any) -> dict[str, Any]:
     """JSON Schema (2020-12) of a command's --json: the head, and one of its documents."""
     import msgspec
 
-    from emaviz.cli.documents import HeadJson
+    from emaviz.cli.output import HeadJson
 
     (head, *kinds), parts = msgspec.json.schema_components((HeadJson, *verb.documents()), ref_template="#/$defs/{name}")
     return {

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
     from ema_model.actuator import Actuator
     from ema_model.recordings import Measurement
-    from emaviz.cli.documents import SimulatedJson
+    from emaviz.cli.output import SimulatedJson
 
 HELP = "simulate one run of the reference or the monitor model and write it as a recording"
 PLACE = 2
@@ -47,7 +47,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def documents() -> tuple[type, ...]:
     """What --json holds."""
-    from emaviz.cli.documents import SimulatedJson
+    from emaviz.cli.output import SimulatedJson
 
     return (SimulatedJson,)
 
@@ -59,10 +59,10 @@ def run(arguments: argparse.Namespace) -> int:
     from ema_model.actuator.actuator import readings
     from ema_model.recordings import write_measurement
     from ema_model.recordings.measurement import Sensors
-    from emaviz.cli import option_values, output
+    from emaviz.cli import flow, output
 
-    actuator = option_values.actuator_of(arguments)
-    k, effects = option_values.faults_of(arguments, actuator.faults), option_values.effects_of(arguments, actuator.axes)
+    actuator = flow.actuator_of(arguments)
+    k, effects = flow.faults_of(arguments, actuator.faults), flow.effects_of(arguments, actuator.axes)
     sensors = Sensors(arguments.noise_current, arguments.encoder_bits)
     try:
         signals = _simulated(arguments, actuator, k, effects)
@@ -90,13 +90,13 @@ def run(arguments: argparse.Namespace) -> int:
 def _simulated(
     arguments: argparse.Namespace, actuator: Actuator, k: np.ndarray, effects: dict[str, dict[str, float]]
 ) -> Measurement:
-    from emaviz.cli import option_values
+    from emaviz.cli import flow
 
     if arguments.input:
         from ema_model.models.open_loop import simulate_open_loop
 
-        return simulate_open_loop(option_values.input_of(arguments, actuator), actuator, k, effects)
-    asked = option_values.run_of(arguments, actuator, arguments.sample_rate)
+        return simulate_open_loop(flow.input_of(arguments, actuator), actuator, k, effects)
+    asked = flow.run_of(arguments, actuator, arguments.sample_rate)
     from ema_model.simulation.run import simulate_monitor, simulate_reference
 
     if arguments.model == "rm":

@@ -55,8 +55,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def documents() -> tuple[type, ...]:
     """What --json holds."""
     from ema_model.result import json_type
-    from ema_model.tracking.result import Tracked
-    from emaviz.cli.documents import InterruptedTrackJson
+    from ema_model.tracking.track import Tracked
+    from emaviz.cli.output import InterruptedTrackJson
 
     return (json_type(Tracked, InterruptedTrackJson),)
 
@@ -66,10 +66,10 @@ def run(arguments: argparse.Namespace) -> int:
 
     Once interrupted, what the flights so far say.
     """
-    from emaviz.cli import option_values, output
+    from emaviz.cli import flow, output
 
     thresholds = _thresholds(arguments.threshold)
-    actuator = option_values.actuator_of(arguments)
+    actuator = flow.actuator_of(arguments)
     progress = output.Progress(arguments)
     try:
         if arguments.watch:
@@ -83,7 +83,7 @@ def run(arguments: argparse.Namespace) -> int:
                         flights.append(flight)
                         answer.grows()
             except KeyboardInterrupt:
-                from ema_model.tracking.evidence import LEAST_FLIGHTS
+                from ema_model.tracking.trends import LEAST_FLIGHTS
 
                 progress.done()
                 print(f"Interrupted: {len(flights)} of {len(paths)} flights are identified.", flush=True)
@@ -103,15 +103,15 @@ def _identified(
     paths: Sequence[Path], arguments: argparse.Namespace, actuator: Actuator, progress: output.Progress
 ) -> Iterator[Flight]:
     from ema_model.tracking.flights import identify_all
-    from emaviz.cli import option_values
+    from emaviz.cli import flow
 
     return identify_all(
         paths,
-        lambda path: option_values.read_one(str(path), arguments, actuator, progress),
+        lambda path: flow.read_one(str(path), arguments, actuator, progress),
         actuator,
         arguments.seed,
         lambda number, name: progress.show(f"flight {number + 1} of {len(paths)}: {name}", number / len(paths)),
-        lambda line: option_values.say(line, progress),
+        lambda line: flow.say(line, progress),
     )
 
 
@@ -138,11 +138,11 @@ def _watch(
     arguments: argparse.Namespace, actuator: Actuator, thresholds: Mapping[str, float], progress: output.Progress
 ) -> None:
     """Until it is interrupted; a file that cannot be used is told once and left out, and may be replaced."""
-    from ema_model.files.arriving import LOOK_S, Watched
+    from ema_model.files.opened import LOOK_S, Watched
     from ema_model.recordings.recording_set import recordings_in
-    from ema_model.tracking.evidence import LEAST_FLIGHTS
     from ema_model.tracking.flights import check_order, in_order
-    from emaviz.cli import option_values
+    from ema_model.tracking.trends import LEAST_FLIGHTS
+    from emaviz.cli import flow
 
     folder = Path(arguments.files[0])
     if len(arguments.files) > 1 or not folder.is_dir():
@@ -159,7 +159,7 @@ def _watch(
                     check_order(in_order([*flights, path]))
                     flights |= zip([path], _identified([path], arguments, actuator, progress))
                 except InputError as error:
-                    option_values.say(f"{error}; left out", progress)
+                    flow.say(f"{error}; left out", progress)
             if len(flights) < LEAST_FLIGHTS:
                 progress.show(f"{len(flights)} of the {LEAST_FLIGHTS} flights that a trend needs")
             elif any(path in flights for path in new):
@@ -173,11 +173,11 @@ def _thresholds(texts: list[str]) -> dict[str, float]:
     if not texts:
         return {}
     from ema_model.tracking.track import check_thresholds
-    from emaviz.cli import option_values
+    from emaviz.cli import flow
 
     found: dict[str, float] = {}
     for text in texts:
-        name, value = option_values.pair(text, "--threshold")
+        name, value = flow.pair(text, "--threshold")
         if name in found:
             raise InputError(f"--threshold {name}: given twice; write it once")
         found[name] = value

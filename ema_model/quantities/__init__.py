@@ -1,1 +1,0 @@
-"""Quantities: signals, units, titles and axes, each fact in one row."""

@@ -196,17 +196,17 @@ class AnalysisTab(Tab):
     analysis: ClassVar[str]  # its name
     about: ClassVar[str]  # what it is for, above the controls
     steps: ClassVar[Sequence[str]]  # to an answer, while there is none
-    meanwhile: ClassVar[str]  # what is done while it runs
-    example: ClassVar[tuple[str, str]]  # its button, and what that does
-    record_example: ClassVar[Callable[[Actuator], Measurement]]  # of the standard actuator
+    meanwhile: ClassVar[str] = "The recordings are analysed."  # what is done while it runs
+    example: ClassVar[tuple[str, str] | None] = None  # its button, and what that does
+    record_example: ClassVar[Callable[[Actuator], Measurement]]  # of the standard actuator, where there is an example
 
     def __init__(self, shared: Shared, right: viser.PanelHandle) -> None:
         super().__init__(shared, right)
         of = analyses()[self.analysis]
         self.analysing = Analysing(of, shared.comparing, shared.files)
         self._standing = self.standing(self.analysing.provenance)
-        shipped = Example(self.page, *self.example, self._run_example)
-        before = begin(f"There is no {in_sentence(of.title)} yet", self.steps, shipped.html)
+        shipped = None if self.example is None else Example(self.page, *self.example, self._run_example).html
+        before = begin(f"There is no {in_sentence(of.title)} yet", self.steps, shipped)
         with right.add_tab(of.title, self.workspace.icon):
             self._standing.add(self.page.server.gui)
             self.result = AnalysisResult(
@@ -218,8 +218,10 @@ class AnalysisTab(Tab):
         self.panel = AnalysisPanel(self, self.analysing, self.result, self._standing)
 
     def _run_example(self) -> None:
+        assert self.example is not None, "its button was pressed"
+        title, _ = self.example
         record, name = type(self).record_example, f"{self.analysis}-example.parquet"
-        self.page.begins(lambda: self.analysing.begin_example(record, name), title=self.example[0])
+        self.page.begins(lambda: self.analysing.begin_example(record, name), title=title)
 
     def refresh_files(self) -> None:
         """What Compare has."""

@@ -17,6 +17,7 @@ from ema_model.comparison.explain import Explanation
 from ema_model.comparison.verdict import most_of_floor
 from ema_model.discovery.contradictions import contradictions, goes_by_angle, put_right
 from ema_model.discovery.criteria import (
+    AS_WELL,
     FAR,
     HALF,
     LARGEST_GROUP,
@@ -583,12 +584,13 @@ class Search:
         smaller = story.without(key, tell)
         candidate = term.candidate(other.amounts[-len(term.unknowns.mean) :], story.current)
         trial = refitted(story.data, smaller, candidate, smaller.starts, tell, key=term.name)
-        after = evidence_of_fit(story.data, story.held, trial.fit, seen.noise).log
-        gain = after + term.log_share - seen.before.log
+        after, before = evidence_of_fit(story.data, story.held, trial.fit, seen.noise), seen.before
+        gain = after.log + term.log_share - before.log
+        fits_as_well = after.density + after.unseen > before.density + before.unseen - AS_WELL
         is_its_term = not trial.faults and catalogue_name(key) in find(candidate.name).terms
         if gain < (NAMED if is_its_term else 0.0):
             if key not in NAMES:
-                story.tie(key, candidate.name, gain > -NAMED)
+                story.tie(key, candidate.name, gain > -NAMED or fits_as_well)
             return False
         if trial.faults or key in NAMES:
             story.remove(key, smaller)

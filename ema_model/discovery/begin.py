@@ -13,7 +13,7 @@ from ema_model.comparison.residuals import OPEN_LOOP
 from ema_model.comparison.result import Comparison
 from ema_model.discovery.criteria import FAR
 from ema_model.discovery.history import Step, Story, rung_of
-from ema_model.discovery.observed.repeatability import by_inverse_dynamics, is_lost, with_divergence
+from ema_model.discovery.observed.repeated import by_inverse_dynamics, is_lost, with_divergence
 from ema_model.discovery.refit import settings_in, together
 from ema_model.discovery.result import Change
 from ema_model.discovery.scoring import scored_terms

@@ -18,8 +18,7 @@ from ema_model.discovery.criteria import FAR, HALF, NAMED
 from ema_model.discovery.curve import curve_trial
 from ema_model.discovery.fingerprints import Fingerprint, fingerprints, may_act, of_the_file
 from ema_model.discovery.observed.controller import ControllerSeen
-from ema_model.discovery.observed.transmission import TransmissionSeen
-from ema_model.discovery.observed.two_masses import TwoMasses
+from ema_model.discovery.observed.transmission import TransmissionSeen, TwoMasses
 from ema_model.discovery.refit import Trial, fitted_to_the_end, refitted, stands_for, without_fault
 from ema_model.discovery.remaining import Left, at_floor, left_by
 from ema_model.discovery.result import Added, Candidate, Change, Contradiction, Rung, StoodIn

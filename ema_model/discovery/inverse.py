@@ -17,7 +17,7 @@ from ema_model.discovery.begin import calibrated_story
 from ema_model.discovery.criteria import APART, GONE, HALF, HEARD, LOOP_TOLD, MUCH_BETTER, NAMED
 from ema_model.discovery.history import Story
 from ema_model.discovery.observed.controller import ControllerSeen, controller_seen
-from ema_model.discovery.observed.repeatability import by_inverse_dynamics
+from ema_model.discovery.observed.repeated import by_inverse_dynamics
 from ema_model.discovery.remaining import at_floor, ratio
 from ema_model.discovery.result import Added, Candidate, Change
 from ema_model.discovery.uncertainty import with_intervals

@@ -21,8 +21,7 @@ from ema_model.comparison.regions import Event
 from ema_model.discovery.criteria import FAR
 from ema_model.discovery.observed.controller import ControllerSeen
 from ema_model.discovery.observed.repeated import Repeated
-from ema_model.discovery.observed.transmission import TransmissionSeen
-from ema_model.discovery.observed.two_masses import TwoMasses
+from ema_model.discovery.observed.transmission import TransmissionSeen, TwoMasses
 from ema_model.effects import CATALOGUE, find
 from ema_model.errors import InputError
 from ema_model.estimation import Calibrated, Calibration, Floor

@@ -34,8 +34,7 @@ from ema_model.discovery.evidence import evidence_of, gains_of
 from ema_model.discovery.history import Story
 from ema_model.discovery.inverse import Opinion, compared, second_opinion, taken_over
 from ema_model.discovery.objections import implausible, unmeasured, unsteady, within
-from ema_model.discovery.observed.transmission import transmission_seen
-from ema_model.discovery.observed.two_masses import two_masses_seen
+from ema_model.discovery.observed.transmission import transmission_seen, two_masses_seen
 from ema_model.discovery.refit import Trial, fitted_to_the_end, refitted
 from ema_model.discovery.remaining import at_floor, ratio, told_ratio, within_band
 from ema_model.discovery.result import Added, Candidate

@@ -14,10 +14,10 @@ from numpy.typing import NDArray
 
 from ema_model.actuator import save_actuator
 from ema_model.discovery import Candidate, Story, verified
+from ema_model.discovery.fingerprints import Preview as Room
+from ema_model.discovery.fingerprints import preview as room_for
 from ema_model.discovery.history import Step
 from ema_model.discovery.next_experiment import next_experiment
-from ema_model.discovery.preview import Preview as Room
-from ema_model.discovery.preview import preview as room_for
 from ema_model.discovery.refit import Trial
 from ema_model.discovery.result import Experiment
 from ema_model.discovery.search import search

@@ -13,7 +13,7 @@ from ema_model.comparison.compare import weights_of
 from ema_model.discovery import discover
 from ema_model.discovery.fingerprints import fingerprints
 from ema_model.discovery.next_experiment import allowed, next_experiment
-from ema_model.discovery.observed.repeatability import is_lost, with_divergence
+from ema_model.discovery.observed.repeated import is_lost, with_divergence
 from ema_model.discovery.refit import Trial
 from ema_model.discovery.result import Candidate
 from ema_model.discovery.scoring import scored_terms

@@ -288,12 +288,33 @@ def test_of_many_discoveries_the_last_ones_are_whole(discovering):
     assert entries.all[3].told is not None and entries.all[2].told is not None
 
 
-def test_a_session_that_is_loaded_where_it_was_saved_shows_it_at_once(rig, discovering):
-    path, before = rig.save(), discovering.look
-    count = len(discovering.entries.all)
+def test_a_session_that_is_loaded_where_it_was_saved_shows_it_at_once(rig, added):
+    """With a torque of one's own beside what was hidden."""
+    assert added.add_own(user_torque("c*omega"), {"c": 1e-5})
+    wait_until(lambda: not added.running)
+    path, before = rig.save(), added.look
+    assert before.steps == 3
+    count = len(added.entries.all)
     rig.load(path)
-    assert discovering.look is before and not discovering.job.waiting
-    assert len(discovering.entries.all) == count
+    assert added.look is before and not added.job.waiting
+    assert len(added.entries.all) == count
+
+
+def test_a_plant_of_explore_is_sealed_and_can_be_chosen(rig, discovering):
+    for name, value in {"amplitude_Nm": 0.02, "order": 12.0, "phase_rad": 0.5}.items():
+        rig.session.settings.set_effect("cogging_torque", name, value)
+    sealed = []
+    discovering.sealing.sealed.connect(sealed.append)
+    with pytest.raises(InputError, match="no story yet"):
+        discovering.sealing.seal("Mine", "  ")
+    assert discovering.sealing.seal("../Mine & yours", "It hums.")
+    wait_until(lambda: sealed)
+    assert sealed[0].parent == rig.folder.challenges and sealed[0].suffix == ".challenge"
+    (name,) = discovering.source.sealed
+    discovering.source.choose(name)
+    given = discovering.source.read(discovering.source.recipe())
+    assert len(given.fitted) > 0 and len(given.held) > 0
+    discovering.source.choose(EASY)
 
 
 def test_a_step_back_is_at_once_and_shows_the_same_cards(calibrated, added):

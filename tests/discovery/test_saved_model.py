@@ -22,9 +22,9 @@ from ema_model.simulation.run import Run, simulate_reference
 ACTUATOR = load_actuator()
 RIG = Sensors(current_noise_A=0.3, encoder_bits=12)
 FAULT, HIDDEN = {"k1": 0.3}, {"cogging_torque": {"amplitude_Nm": 0.02, "order": 12.0}}
-CHIRP = Run(command("chirp"), 0.3)
-SINE = Run(command("sine", {"amplitude_rad": 0.03, "frequency_Hz": 4.0}), 0.3)
-UNSEEN = Run(command("sine", {"amplitude_rad": 0.02, "frequency_Hz": 5.0}), 0.25)
+CHIRP = Run(command("chirp"), 0.4)
+SINE = Run(command("sine", {"amplitude_rad": 0.03, "frequency_Hz": 3.0}), 0.4)
+UNSEEN = Run(command("sine", {"amplitude_rad": 0.02, "frequency_Hz": 5.0}), 0.3)
 
 
 def recorded(run, effects, seed=0, faults=FAULT):

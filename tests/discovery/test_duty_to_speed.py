@@ -32,7 +32,7 @@ def found_of(folder, bench: Bench) -> Discovery:
     """Two runs fitted, a third held out."""
     (folder / "motor.toml").write_text(FILE, encoding="utf-8")
     actuator = em.load_actuator(folder / "motor.toml")
-    runs = [Measurement(logged(bench, seed, rate_Hz=500.0, duration_s=0.6), name=f"run {seed}") for seed in (1, 2, 3)]
+    runs = [Measurement(logged(bench, seed, rate_Hz=500.0, duration_s=0.9), name=f"run {seed}") for seed in (1, 2, 3)]
     return discover(runs[:2], actuator, holdout=runs[2:], candidates=CANDIDATES)
 
 

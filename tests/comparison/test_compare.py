@@ -8,7 +8,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from support.hidden_effects import ACTUATOR, SHORT_SINE, plant, recorded
+from support.hidden_effects import ACTUATOR, SINE, plant, recorded
 
 from ema_model.actuator import load_actuator
 from ema_model.comparison import compare, regions
@@ -30,7 +30,7 @@ def cogged():
 @pytest.mark.parametrize(
     "command, noise",
     [
-        (SHORT_SINE, 0.45),
+        (SINE, 0.45),
         (("chirp", {}, 0.5), 0.1),
         (("step", {"final_rad": 0.005}, 0.5), 0.45),
         (("staircase", {}, 1.0), 0.2),
@@ -76,7 +76,7 @@ def test_error_falls_to_the_floor_once_the_effect_is_in_the_model(cogged):
 
 def test_calibration_finds_the_plant():
     truth = plant(11)
-    found = compare(recorded(11, commands=[("chirp", {}, 0.5), SHORT_SINE]), ACTUATOR).calibration
+    found = compare(recorded(11, commands=[("chirp", {}, 0.5), SINE]), ACTUATOR).calibration
     assert found is not None and found.converged
     for path in ("motor.inertia_kgm2", "motor.dynamic_friction_Nm", "transmission.backlash_rad"):
         low, high = found.parameters[path].interval90

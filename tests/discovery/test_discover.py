@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from support.hidden_effects import ACTUATOR, SHORT_SINE, recorded
+from support.hidden_effects import ACTUATOR, SINE, recorded
 
 from ema_model.actuator import load_actuator, save_actuator
 from ema_model.comparison import compare
 from ema_model.discovery import discover, settings_of
 from ema_model.errors import InputError
 
-COMMANDS = [("chirp", {}, 0.5), ("step", {"final_rad": 0.005}, 0.5), SHORT_SINE]
+COMMANDS = [("chirp", {}, 0.5), ("step", {"final_rad": 0.005}, 0.5), SINE]
 UNSEEN = [("sine", {"amplitude_rad": 0.02, "frequency_Hz": 5}, 0.5)]
 # A few that a test has time for; all others stand against them in the study.
 NAMES = ("cogging_torque", "stribeck_friction", "hinge_moment", "load_dependent_friction")
@@ -90,7 +90,7 @@ def test_improved_model_is_saved_loaded_and_adequate(cogged, tmp_path):
         name: {parameter: pytest.approx(value) for parameter, value in given.items()}
         for name, given in cogged.actuator.effects.items()
     }
-    again = compare(recorded(31, commands=[SHORT_SINE], effects={"cogging_torque": CASES["cogging_torque"]}), better)
+    again = compare(recorded(31, commands=[SINE], effects={"cogging_torque": CASES["cogging_torque"]}), better)
     assert again.adequate
 
 

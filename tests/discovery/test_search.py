@@ -4,7 +4,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from support.hidden_effects import ACTUATOR, SHORT_SINE, recorded
+from support.hidden_effects import ACTUATOR, SINE, recorded
 
 from ema_model.discovery import discover, rounds, search, words
 from ema_model.discovery.evidence import Unknowns, evidence_of, gains_of
@@ -95,7 +95,7 @@ def test_unknowns_can_be_left_out(made):
 # --- discoveries by it, of recordings that the three-phase model made -------------------------------------------------
 
 AMONG = ("cogging_torque", "constant_load", "current_sensor_bias", "stribeck_friction", "torque_ripple")
-COMMANDS = [("chirp", {}, 0.5), SHORT_SINE]
+COMMANDS = [("chirp", {}, 0.5), SINE]
 
 
 def _found(effects, among=AMONG):

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from support.discovered import with_cogging, with_unknown
-from support.hidden_effects import ACTUATOR, SHORT_SINE, recorded
+from support.hidden_effects import ACTUATOR, SINE, recorded
 
 from ema_model.comparison.criteria import BAND
 from ema_model.comparison.residuals import Residuals
@@ -54,7 +54,7 @@ def _counted(calibration, times: float):
 
 @pytest.fixture(scope="module")
 def healthy():
-    return begun(recorded(31, commands=[SHORT_SINE]), ACTUATOR)
+    return begun(recorded(31, commands=[SINE]), ACTUATOR)
 
 
 @pytest.fixture(scope="module")

@@ -17,7 +17,6 @@ from ema_model.simulation.run import Run, simulate_reference
 
 ACTUATOR = load_actuator()
 SINE = ("sine", {"amplitude_rad": 0.03, "frequency_Hz": 3}, 1.0)  # several turns of the motor, slowly
-SHORT_SINE = (*SINE[:2], 0.7)  # where two strokes are enough
 Command = tuple[str, Mapping[str, Any], float]
 
 

@@ -53,7 +53,7 @@ def page() -> Html:
         # a slider's number in full: viser's box has room for five characters
         ".mantine-Slider-root ~ .mantine-NumberInput-root,"
         "div:has(> .mantine-Slider-root) + .mantine-NumberInput-root,"
-        "div:has(> * .mantine-Slider-root) > .mantine-NumberInput-root{width:3.9rem!important}"
+        "div:has(> div .mantine-Slider-root) > .mantine-NumberInput-root{width:3.9rem!important}"
         # five tabs of a narrow panel on the right in one line, too
         "[data-dock-region=right] [data-dock-tab]{padding-left:9px!important;padding-right:9px!important;"
         "max-width:none!important}"

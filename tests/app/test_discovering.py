@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import time
 import zipfile
 from dataclasses import replace
@@ -22,36 +23,63 @@ from emaviz.page.discover import STEPS, step
 from emaviz.page.discover_result import _SHOWN, as_csv, run_of
 from emaviz.recording.read import read
 from emaviz.scene.playback import motion
+from emaviz.session.discovery_history import KEPT, WHOLE, Entries
 from emaviz.session.discovery_source import agrees, document_of
 
 EASY = "first_bench_run"
 
 
 @pytest.fixture(scope="module")
-def discovering(tmp_path_factory):
-    """With the easy challenge calibrated, and nothing added."""
+def rig(tmp_path_factory):
+    """An app without a screen."""
     rig = Rig(tmp_path_factory.mktemp("data"))
+    yield rig
+    rig.close()
+
+
+@pytest.fixture(scope="module")
+def discovering(rig):
+    """With the easy challenge calibrated, and nothing added."""
     made = rig.discovering
     with pytest.raises(InputError, match="no measurement to fit is chosen"):
         made.start()
     made.source.choose(EASY)
     assert made.start()
     wait_until(lambda: not made.running)
-    yield made
-    rig.close()
+    return made
 
 
-@pytest.fixture
-def fresh(discovering):
-    """The same, without what an earlier test has added."""
-    while discovering.look.steps > 1:
+@pytest.fixture(scope="module")
+def calibrated(discovering):
+    """What is seen before anything is added."""
+    return first(discovering).look
+
+
+def first(discovering, steps=1):
+    """Takes back what an earlier test has added after so many steps."""
+    while discovering.look.steps > steps:
         discovering.undo()
         wait_until(lambda: not discovering.running)
     return discovering
 
 
-def test_the_first_card_is_what_is_hidden(fresh):
-    look = fresh.look
+@pytest.fixture
+def fresh(discovering):
+    """The same, without what an earlier test has added."""
+    return first(discovering)
+
+
+@pytest.fixture
+def added(discovering, calibrated):
+    """With what is hidden added, and nothing else; an earlier test may have done so."""
+    if [one.name for one in first(discovering, 2).look.added] != ["cogging_torque"]:
+        assert first(discovering).add("cogging_torque")
+        wait_until(lambda: not discovering.running)
+    return discovering
+
+
+def test_the_first_card_is_what_is_hidden(calibrated):
+    look = calibrated
     best = look.promising[0]
     assert best.name == "cogging_torque" and best.settings["order"] == 14
     text = discover_candidate.label(look, best)
@@ -60,24 +88,22 @@ def test_the_first_card_is_what_is_hidden(fresh):
     assert abs(amplitude - 0.02) < 2.0 * half < 0.005
 
 
-def test_a_prediction_is_what_the_refit_gives(fresh):
-    look = fresh.look
-    best = look.promising[0]
-    assert fresh.add(best.name)
-    wait_until(lambda: not fresh.running)
-    after = fresh.look.rmse
-    assert look.predicted_rmse(best) == pytest.approx(after, rel=0.25)
-    assert after < 1.1 < look.rmse
-    assert fresh.look.found.ladder[-1].holdout_rmse < 1.1
-    assert not fresh.look.promising, "nothing else is hidden"
-    truth = fresh.source.reveal()
-    assert agrees(truth, fresh.look.found, fresh.look.added)
-    assert "Your answer agrees" in document_of(truth, fresh.look.found, fresh.look.added).text
-    assert not agrees(truth, fresh.look.found, ())
+def test_a_prediction_is_what_the_refit_gives(calibrated, added):
+    best = calibrated.promising[0]
+    assert [best.name] == [one.name for one in added.look.added]
+    after = added.look.rmse
+    assert calibrated.predicted_rmse(best) == pytest.approx(after, rel=0.25)
+    assert after < 1.1 < calibrated.rmse
+    assert added.look.found.ladder[-1].holdout_rmse < 1.1
+    assert not added.look.promising, "nothing else is hidden"
+    truth = added.source.reveal()
+    assert agrees(truth, added.look.found, added.look.added)
+    assert "Your answer agrees" in document_of(truth, added.look.found, added.look.added).text
+    assert not agrees(truth, added.look.found, ())
 
 
-def test_a_signature_is_beside_the_residual_that_it_explains(fresh):
-    look = fresh.look
+def test_a_signature_is_beside_the_residual_that_it_explains(calibrated):
+    look = calibrated
     signal = look.primary
     left = look.residuals.values[signal]
     right, wrong = (look.change(look.candidate(name), signal) for name in ("cogging_torque", "stribeck_friction"))
@@ -86,44 +112,29 @@ def test_a_signature_is_beside_the_residual_that_it_explains(fresh):
     assert np.sum((left - right) ** 2) < np.sum((left - wrong) ** 2)
 
 
-def test_a_stopped_step_leaves_the_model_as_it_was(fresh):
-    before = fresh.look
+def test_a_stopped_step_leaves_the_model_as_it_was(added):
+    before = added.look
     told = []
-    fresh.job.ended.connect(told.append)
-    assert fresh.add("stribeck_friction")
+    added.job.ended.connect(told.append)
+    assert added.add("stribeck_friction")
     with pytest.raises(InputError, match="a step is running"):
-        fresh.undo()
-    fresh.job.stop()
+        added.undo()
+    added.job.stop()
     wait_until(lambda: told)
-    assert told[-1].startswith("Stopped") and not fresh.running
-    assert fresh.look is before
-    assert fresh.start(), "another step can begin"
-    fresh.job.stop()
-    wait_until(lambda: not fresh.running)
+    assert told[-1].startswith("Stopped") and not added.running
+    assert added.look is before
+    assert added.start(), "another step can begin"
+    added.job.stop()
+    wait_until(lambda: not added.running)
 
 
-def test_a_step_back_is_at_once_and_shows_the_same_cards(fresh):
-    before = [one.name for one in fresh.look.promising]
-    fresh.add("cogging_torque")
-    wait_until(lambda: not fresh.running)
-    began = time.perf_counter()
-    fresh.undo()
-    assert time.perf_counter() - began < 1.0 and not fresh.running
-    assert [one.name for one in fresh.look.promising] == before
-    with pytest.raises(InputError, match="no step to take back"):
-        fresh.undo()
-
-
-def test_an_effect_is_removed_as_a_step_of_its_own(fresh):
-    calibrated = fresh.look.rmse
-    fresh.add("cogging_torque")
-    wait_until(lambda: not fresh.running)
+def test_an_effect_is_removed_as_a_step_of_its_own(calibrated, added):
     with pytest.raises(InputError, match="not in the model"):
-        fresh.remove("hinge_moment")
-    fresh.remove("cogging_torque")
-    wait_until(lambda: not fresh.running)
-    assert not fresh.look.added and fresh.look.steps == 3
-    assert 0.95 * calibrated < fresh.look.rmse < 1.02 * calibrated, "as before, or in a deeper minimum"
+        added.remove("hinge_moment")
+    added.remove("cogging_torque")
+    wait_until(lambda: not added.running)
+    assert not added.look.added and added.look.steps == 3
+    assert 0.95 * calibrated.rmse < added.look.rmse < 1.02 * calibrated.rmse, "as before, or in a deeper minimum"
 
 
 @pytest.mark.long
@@ -139,15 +150,13 @@ def test_an_expression_of_the_user_is_fitted(fresh):
         fresh.add_own(effect, {})
 
 
-def test_a_recording_is_played_as_measured_and_as_each_model_has_it(fresh):
-    fresh.add("cogging_torque")
-    wait_until(lambda: not fresh.running)
-    track = tracks(fresh.look.found)[2]
+def test_a_recording_is_played_as_measured_and_as_each_model_has_it(added):
+    track = tracks(added.look.found)[2]
     runs = [run_of(track, shown) for shown in _SHOWN]
     off = [np.sqrt(np.mean((run["current_A"] - runs[0]["current_A"]) ** 2)) for run in runs[1:]]
     assert 0.0 < off[1] < off[0], "with the effect, the actuator moves more like the measured one"
     for run in runs:
-        shown = motion(run, HEALTHY, fresh.look.found.actuator)
+        shown = motion(run, HEALTHY, added.look.found.actuator)
         assert shown.duration_s == pytest.approx(1.0, abs=0.02) and np.ptp(shown.surface_rad) > 0.1
     with pytest.raises(InputError, match="current_A was not fitted"):
         run_of(replace(track, measured={}, models=[{}]), _SHOWN[0])
@@ -216,18 +225,16 @@ def test_a_torque_without_value_fails_as_a_candidate_and_nothing_else(fresh, tex
     assert previewed(fresh, "c*omega", {"c": 0.0}).rmse == pytest.approx(before.rmse, rel=0.03), "the thread lives"
 
 
-def test_what_is_kept_opens_again(fresh):
-    fresh.add("cogging_torque")
-    wait_until(lambda: not fresh.running)
+def test_what_is_kept_opens_again(added):
     kept = []
-    fresh.events.kept.connect(kept.append)
+    added.events.kept.connect(kept.append)
     for suffix in (".html", ".rrd", ".toml"):
-        fresh.keep(suffix)
+        added.keep(suffix)
         wait_until(lambda suffix=suffix: any(path.suffix == suffix for path in kept))
     told = []
-    fresh.events.verified.connect(lambda path, text: told.append((path.suffix, text)))
-    assert fresh.take_home()
-    wait_until(lambda: not fresh.running)
+    added.events.verified.connect(lambda path, text: told.append((path.suffix, text)))
+    assert added.take_home()
+    wait_until(lambda: not added.running)
     (home,) = (path for path in kept if path.suffix == ".zip")
     with zipfile.ZipFile(home) as archive:
         names = {Path(name).suffix for name in archive.namelist()}
@@ -240,7 +247,7 @@ def test_what_is_kept_opens_again(fresh):
     assert "Cogging torque" in report.read_text(encoding="utf-8")
     assert read(recording) is not None
     assert load_actuator(model).effects["cogging_torque"]["order"] == 14
-    assert fresh.folder.name_of(model) in fresh.folder.actuator_files()
+    assert added.folder.name_of(model) in added.folder.actuator_files()
 
 
 @pytest.mark.long
@@ -256,16 +263,67 @@ def test_the_next_test_is_between_the_two_best(fresh):
     assert fresh.look.found.next_experiment is found
 
 
-def test_the_guide_follows_the_story(fresh):
+def test_the_guide_follows_the_story(calibrated, added):
     assert step(None, False, None, False)[0] == 1
     assert step(None, True, None, False)[0] == 2
-    look = fresh.look
-    assert step(look, False, None, False)[0] == 3
-    assert step(look, False, "cogging_torque", False)[0] == 4
-    fresh.add("cogging_torque")
-    wait_until(lambda: not fresh.running)
-    assert step(fresh.look, False, None, False)[0] == 5
-    assert step(fresh.look, False, None, True)[0] == STEPS
+    assert step(calibrated, False, None, False)[0] == 3
+    assert step(calibrated, False, "cogging_torque", False)[0] == 4
+    assert step(added.look, False, None, False)[0] == 5
+    assert step(added.look, False, None, True)[0] == STEPS
+
+
+def test_of_many_discoveries_the_last_ones_are_whole(discovering):
+    """What one has scored takes 150 MB, and its steps some tens: of those long before there is but a line."""
+    now, entries = discovering.entries.current, Entries(discovering.source)
+    words = []
+    for _ in range(KEPT + 2):
+        told = copy.copy(now.told)
+        entries.begin(told).look = now.look
+        words.append(entries.current.words)
+    assert [one.told is None for one in entries.all] == [True, True] + KEPT * [False]
+    scored = [one.told is not None and one.told.refits is not None for one in entries.all]
+    assert scored == (2 + KEPT - WHOLE) * [False] + WHOLE * [now.told.refits is not None]
+    assert [one.words for one in entries.all] == words, "they are told as before"
+    entries.show(entries.all[3])
+    assert entries.all[3].told is not None and entries.all[2].told is not None
+
+
+def test_a_session_that_is_loaded_where_it_was_saved_shows_it_at_once(rig, added):
+    """With a torque of one's own beside what was hidden."""
+    assert added.add_own(user_torque("c*omega"), {"c": 1e-5})
+    wait_until(lambda: not added.running)
+    path, before = rig.save(), added.look
+    assert before.steps == 3
+    count = len(added.entries.all)
+    rig.load(path)
+    assert added.look is before and not added.job.waiting
+    assert len(added.entries.all) == count
+
+
+def test_a_plant_of_explore_is_sealed_and_can_be_chosen(rig, discovering):
+    for name, value in {"amplitude_Nm": 0.02, "order": 12.0, "phase_rad": 0.5}.items():
+        rig.session.settings.set_effect("cogging_torque", name, value)
+    sealed = []
+    discovering.sealing.sealed.connect(sealed.append)
+    with pytest.raises(InputError, match="no story yet"):
+        discovering.sealing.seal("Mine", "  ")
+    assert discovering.sealing.seal("../Mine & yours", "It hums.")
+    wait_until(lambda: sealed)
+    assert sealed[0].parent == rig.folder.challenges and sealed[0].suffix == ".challenge"
+    (name,) = discovering.source.sealed
+    discovering.source.choose(name)
+    given = discovering.source.read(discovering.source.recipe())
+    assert len(given.fitted) > 0 and len(given.held) > 0
+    discovering.source.choose(EASY)
+
+
+def test_a_step_back_is_at_once_and_shows_the_same_cards(calibrated, added):
+    began = time.perf_counter()
+    added.undo()
+    assert time.perf_counter() - began < 1.0 and not added.running
+    assert [one.name for one in added.look.promising] == [one.name for one in calibrated.promising]
+    with pytest.raises(InputError, match="no step to take back"):
+        added.undo()
 
 
 def test_recordings_of_compare_can_be_held_out(discovering):

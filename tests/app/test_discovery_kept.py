@@ -20,7 +20,7 @@ from emaviz.page import discover_candidate
 from emaviz.page.discover_result import answer
 from emaviz.session import session_file
 from emaviz.session.data_folder import DataFolder
-from emaviz.session.discovery_history import KEPT, WHOLE, Entries, StoredStory, Telling
+from emaviz.session.discovery_history import StoredStory, Telling
 from emaviz.session.discovery_source import Recipe, agrees, document_of, sensors_of, truth_of
 from emaviz.session.session_file import Part
 from emaviz.session.settings import Settings
@@ -63,30 +63,6 @@ def solved(rigs):
     here.discovering.add_own(user_torque("c*omega"), {"c": 1e-5})
     here.done()
     return here
-
-
-def test_of_many_discoveries_the_last_ones_are_whole(solved):
-    """What one has scored takes 150 MB, and its steps some tens: of those long before there is but a line."""
-    now, entries = solved.discovering.entries.current, Entries(solved.discovering.source)
-    words = []
-    for _ in range(KEPT + 2):
-        told = copy.copy(now.told)
-        entries.begin(told).look = now.look
-        words.append(entries.current.words)
-    assert [one.told is None for one in entries.all] == [True, True] + KEPT * [False]
-    scored = [one.told is not None and one.told.refits is not None for one in entries.all]
-    assert scored == (2 + KEPT - WHOLE) * [False] + WHOLE * [now.told.refits is not None]
-    assert [one.words for one in entries.all] == words, "they are told as before"
-    entries.show(entries.all[3])
-    assert entries.all[3].told is not None and entries.all[2].told is not None
-
-
-def test_a_session_that_is_loaded_where_it_was_saved_shows_it_at_once(solved):
-    path, before = solved.save(), solved.discovering.look
-    count = len(solved.discovering.entries.all)
-    solved.load(path)
-    assert solved.discovering.look is before and not solved.discovering.job.waiting
-    assert len(solved.discovering.entries.all) == count
 
 
 def ladder(rig):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+from functools import cache
 
 from emaviz.cli import COMMANDS
 from emaviz.cli.options import Input, Output
@@ -15,6 +16,7 @@ TEXT = {  # options that name no file and take no single number; each is refused
 }  # fmt: skip
 
 
+@cache
 def command_parser(command: str) -> argparse.ArgumentParser:
     """The parser of one command, "actuator new" of one's verb."""
     found: argparse.ArgumentParser = parser_of(command.partition(" ")[0])

@@ -87,7 +87,8 @@ def test_verdict_and_ladder_never_contradict(healthy, lacking):
         assert found.at_floor == (rest <= most_of_floor(found.data.floor_spread) < BAND)
         assert not found.effects or found.verdict == ("effects_found" if found.at_floor else "partly_explained")
         told = json.loads(json.dumps(found.to_dict(), allow_nan=False))
-        assert told["remaining"] == {"rmse": rest, "at_floor": found.at_floor}
+        within = found.is_within_band
+        assert told["remaining"] == {"rmse": rest, "at_floor": found.at_floor, "within_band": within}
     assert seen >= {"adequate", "effects_found", "partly_explained", "unknown_effect"}
 
 

@@ -42,3 +42,14 @@ HTMLCanvasElement.prototype.getContext = function (kind, ...how) {
 const frame = window.requestAnimationFrame.bind(window);
 window.requestAnimationFrame = (then) => setTimeout(() => frame(then), 200);
 window.cancelAnimationFrame = clearTimeout;
+
+// Plotly measures each text of a figure in an element of its own at the end of the page, where each of them has the
+// browser match the page's `:has()` rules anew, for 10 ms.  In a shadow root it is measured alike, and for itself.
+let measuring = null;
+const append = Node.prototype.appendChild;
+HTMLBodyElement.prototype.appendChild = function (child) {
+  if (!(child instanceof SVGSVGElement)) return append.call(this, child);
+  measuring ??= append.call(this, document.createElement('div')).attachShadow({ mode: 'open' });
+  measuring.replaceChildren(child);
+  return child;
+};

@@ -14,10 +14,10 @@ from ema_model.simulation.run import Run, simulate_reference
 
 HIDDEN = {"cogging_torque": {"amplitude_Nm": 0.02, "order": 12.0, "phase_rad": 0.7}}
 _RUNS = {
-    "sine": Run(command("sine", {"amplitude_rad": 0.03, "frequency_Hz": 3.0}), 0.7),
-    "a|b <script>": Run(command("chirp"), 0.4),
+    "sine": Run(command("sine", {"amplitude_rad": 0.03, "frequency_Hz": 3.0}), 0.5),
+    "a|b <script>": Run(command("chirp"), 0.3),
 }
-_UNSEEN = Run(command("sine", {"amplitude_rad": 0.02, "frequency_Hz": 5.0}), 0.4)
+_UNSEEN = Run(command("sine", {"amplitude_rad": 0.02, "frequency_Hz": 5.0}), 0.3)
 
 
 @cache

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import cache
+
 import numpy as np
 
 from ema_model.recordings import Measurement
@@ -12,6 +14,7 @@ TORQUE_CONSTANT = 0.05  # N·m/A
 MOTOR, LOAD = 8e-5, 1.6e-4  # kg·m²
 
 
+@cache
 def flexible_drive(
     seed: int,
     antiresonance_Hz: float = 22.0,

@@ -61,10 +61,12 @@ def within(before: Fit, after: Fit, key: str) -> str:
 
 
 def implausible(after: Fit, key: str) -> str:
-    """A value that no such part has."""
+    """A value that no such part has, wherever in its 90 % interval it may lie."""
     values = after.calibration.actuator.effects[key]
     for parameter in find(catalogue_name(key)).parameters:
         value, low, high = values[parameter.name], *parameter.plausible
+        found = after.calibration.parameters.get(f"effects.{key}.{parameter.name}")
+        least, most = (value, value) if found is None else found.interval90
         size, beside = 1.0, ""
         if parameter.plausible_at:
             size = greatest(after, parameter.plausible_at)
@@ -73,7 +75,7 @@ def implausible(after: Fit, key: str) -> str:
             whole = abs(after.calibration.actuator.value(parameter.plausible_of))
             size = 1.0 / max(whole, 1e-300)
             beside = f" beside a {_title(after, parameter.plausible_of)} of {number(whole)}"
-        if (low is not None and value * size < low) or (high is not None and value * size > high):
+        if (low is not None and most * size < low) or (high is not None and least * size > high):
             return f"its {_title(after, f'effects.{key}.{parameter.name}')} of {number(value)} is not plausible{beside}"
         if parameter.name == "period_rad" and value > travel(after):
             return "its period is longer than the travel"

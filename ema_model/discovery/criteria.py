@@ -1,4 +1,4 @@
-"""The numbers that decide what a discovery claims, each with its source."""
+"""The numbers that decide what a discovery claims, each with its source; `search.py` compares with them."""
 
 from __future__ import annotations
 

@@ -36,7 +36,7 @@ FLOORS = {
         ["criteria"],
         ["observed"],
         ["result"],
-        ["evidence", "fingerprints", "preview", "refit", "remaining", "uncertainty", "verify"],
+        ["evidence", "fingerprints", "refit", "remaining", "uncertainty", "verify"],
         ["curve", "next_experiment", "objections", "terms", "words"],
         ["scoring"],
         ["history"],

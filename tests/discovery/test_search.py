@@ -391,3 +391,27 @@ def test_what_a_richer_law_begins_with_is_refitted_beside_it(monkeypatch):
 
 def _trial(one):
     return SimpleNamespace(candidate=one.candidate, faults=())
+
+
+@pytest.mark.parametrize(("gain", "told", "tied"), [(9.0, 0.99988, False), (1.0, 1.0, True)])
+def test_what_takes_the_place_of_an_effect_is_as_probable_as_that_was(gain, told, tied):
+    said: dict[str, float] = {}
+    ties: list[str] = []
+    story = SimpleNamespace(
+        added=(SimpleNamespace(name="dry_friction", key="dry_friction"),),
+        set_probability=said.__setitem__,
+        tie=lambda key, name, equal: ties.append(name),
+    )
+    of = search.Search(story)
+    of._first = [Candidate("current_sensor_gain", 1.0, {}, probability=1.0), Candidate("dry_friction", 0.0, {})]
+    of._is_instead("dry_friction", SimpleNamespace(name="current_sensor_gain", probability=1.0), gain)
+    assert said["dry_friction"] == pytest.approx(told, abs=1e-4), "of both, where they are not told apart"
+    assert ties == (["current_sensor_gain"] if tied else [])
+    probable = {one.name: one.probability for one in of._first}
+    assert sum(probable.values()) == pytest.approx(1.0) and probable["dry_friction"] > probable["current_sensor_gain"]
+
+
+def test_laws_of_one_place_or_speed_are_known():
+    assert search._is_of_one_law("hinge_moment", "cubic_spring")
+    assert not search._is_of_one_law("hinge_moment", "position_sensor_gain"), "a sensor's gain is no spring"
+    assert not search._is_of_one_law("hinge_moment", "hinge_moment") and not search._is_of_one_law("k1", "dry_friction")

@@ -338,9 +338,10 @@ class Search:
         if not named:
             return self._turned_back(contenders) and self._added()
         near = self._is_near()
+        if near:
+            named += self._as_good(named[0], [one for one in contenders if one not in named])
         first = _simplest(named, near)
         name = first.trial.candidate.name
-        # What a true model may leave has a shape of its own, that one of two wrong laws may meet better.
         alike = [one.trial for one in named if one is not first and (near or not first.is_told_apart_from(one))]
         as_probable = {one.candidate.name for one in [first.trial, *alike]}
         # What it is a term of is the same, seen over a short travel: told where nothing else is.
@@ -369,6 +370,16 @@ class Search:
                 if one.trial.candidate.name not in as_probable and self._takes_as_much(one.trial, first.trial)
             ]
         return True
+
+    def _as_good(self, first: Contender, others: Sequence[Contender]) -> list[Contender]:
+        """Laws of the same place or speed that nothing speaks against, where the model leaves no more than a true one.
+
+        What a true model may leave has a shape of its own, that one of two wrong laws may meet better: there a law is
+        not told from another by how probable it is.
+        """
+        laws = [one for one in others if not (one.trial.faults or first.trial.faults)]
+        name = first.trial.candidate.name
+        return [one for one in laws if _is_of_one_law(one.trial.candidate.name, name) and not self._objection(one)]
 
     # --- alternatives -------------------------------------------------------------------------------------------------
 

@@ -60,6 +60,7 @@ def test_what_runs_is_told_on_every_tab_and_what_comes_waits_in_line(page, app, 
     let_go.release(5)
     wait_until(lambda: app.tab(TrackTab).following.last is not None, 20.0)  # eight are enough to look
     box.get_by_role("button", name="Stop this run").click()
+    box.get_by_text("stopping …").wait_for()  # else all flights may be done before it is heard
     let_go.release(20)
     box.get_by_text("Stopped: identifying flights").wait_for()
     box.get_by_text("Show").click()

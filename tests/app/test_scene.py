@@ -491,7 +491,9 @@ def test_without_a_gpu_edges_are_hard_and_motion_comes_first(browser, app):
     try:
         page.goto(app.address)
         posed = "window.__viserMutable?.nodePoseData?.['/actuator/motor/axis/rotor'] !== undefined"
-        page.wait_for_function(posed, timeout=60_000)  # a canvas that is asked before it is drawn gets another context
+        sized = "[...document.querySelectorAll('canvas')].some(one => one.width > 300 && one.height > 300)"
+        # a canvas that is asked before it is drawn gets another context
+        page.wait_for_function(f"{posed} && {sized}", timeout=60_000)
         smooth = """() => [...document.querySelectorAll('canvas')].find(one => one.width > 300 && one.height > 300)
           .getContext('webgl2').getContextAttributes().antialias"""
         assert page.evaluate(smooth) is False

@@ -490,12 +490,10 @@ def test_without_a_gpu_edges_are_hard_and_motion_comes_first(browser, app):
     page = browser.new_page(drawn=True, viewport={"width": 1000, "height": 650})
     try:
         page.goto(app.address)
-        posed = "window.__viserMutable?.nodePoseData?.['/actuator/motor/axis/rotor'] !== undefined"
-        sized = "[...document.querySelectorAll('canvas')].some(one => one.width > 300 && one.height > 300)"
-        # a canvas that is asked before it is drawn gets another context
-        page.wait_for_function(f"{posed} && {sized}", timeout=60_000)
-        smooth = """() => [...document.querySelectorAll('canvas')].find(one => one.width > 300 && one.height > 300)
-          .getContext('webgl2').getContextAttributes().antialias"""
+        # three.js names its canvas as it takes the context: one that is asked before that gets another context
+        drawn = "[...document.querySelectorAll('canvas[data-engine]')].find(one => one.width > 300 && one.height > 300)"
+        page.wait_for_function(f"{drawn} !== undefined", timeout=60_000)
+        smooth = f"() => {drawn}.getContext('webgl2').getContextAttributes().antialias"
         assert page.evaluate(smooth) is False
     finally:
         page.close()

@@ -27,6 +27,14 @@ _MADE_ANEW, _AT_ORDERS = 16, 32  # candidates beside a further model, and Terms 
 _APART = 0.5  # orders, closer than which two are one
 
 
+def are_told_apart(gain: float, density: float) -> bool:
+    """Whether the recordings tell a model from a less probable one, by the logarithms of what that has more.
+
+    Not from one that fits as well, and is less probable for its freedom alone.
+    """
+    return gain < -NAMED and density < -AS_WELL
+
+
 @dataclass(frozen=True, eq=False)
 class Contender:
     """A refitted trial, and how much more probable it makes the recordings than the model that it was tried beside."""
@@ -37,11 +45,8 @@ class Contender:
     density: float  # the logarithm of the probability density at its most probable parameters alone
 
     def is_told_apart_from(self, other: Contender) -> bool:
-        """Whether the recordings tell this one from another that is less probable.
-
-        Not from one that fits as well, and is less probable for its freedom alone.
-        """
-        return other.gain < self.gain - NAMED and other.density < self.density - AS_WELL
+        """Whether the recordings tell this one from another that is less probable."""
+        return are_told_apart(other.gain - self.gain, other.density - self.density)
 
 
 @dataclass(frozen=True, eq=False)

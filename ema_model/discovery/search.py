@@ -17,7 +17,6 @@ from ema_model.comparison.explain import Explanation
 from ema_model.comparison.verdict import most_of_floor
 from ema_model.discovery.contradictions import contradictions, goes_by_angle, put_right
 from ema_model.discovery.criteria import (
-    AS_WELL,
     FAR,
     HALF,
     LARGEST_GROUP,
@@ -38,7 +37,7 @@ from ema_model.discovery.observed.transmission import transmission_seen, two_mas
 from ema_model.discovery.refit import Trial, fitted_to_the_end, refitted
 from ema_model.discovery.remaining import at_floor, ratio, told_ratio, within_band
 from ema_model.discovery.result import Added, Candidate
-from ema_model.discovery.rounds import Contender, Refits, Round, Rounds
+from ema_model.discovery.rounds import Contender, Refits, Round, Rounds, are_told_apart
 from ema_model.discovery.scoring import AboutFit, ScoredTerm, evidence_of_fit, places_of
 from ema_model.effects import CATALOGUE, catalogue_name, find
 from ema_model.estimation.model_fit import Data, Fit, fit, holdout_fit
@@ -257,13 +256,13 @@ class Search:
                 # What promises more than this is refitted, too.
                 best = MIGHT * max((one.gain for one in standing), default=-math.inf)
             if standing:  # what a short travel shows of it, or a narrow range, may be all that there is
-                best_one = max(standing, key=lambda one: one.gain)
-                trial = best_one.trial
+                leading = max(standing, key=lambda one: one.gain)
+                trial = leading.trial
                 tried = {one.trial.candidate.name for one in found}
                 terms = () if trial.faults else find(trial.candidate.name).terms
                 found += self._refits([one for one in room if one.candidate.name in {*terms} - tried])
                 if self._is_near() and not trial.faults:
-                    found = _best_of_each([*found, *self._laws_instead(best_one, room)])
+                    found = _best_of_each([*found, *self._laws_instead(leading, room)])
             self._refitted = seen, sorted(found, key=lambda one: -one.gain)
         return self._refitted[1]
 
@@ -288,7 +287,7 @@ class Search:
         (key,) = first.trial.effects
         about = AboutFit.of(found, seen.noise).without(places_of(found, key))
         own = evidence_of(seen.noise, about.residual, about.unknowns)
-        start = {name: x for name, x in found.starts.items() if not name.startswith(f"effects.{key}.")}
+        start = {path: x for path, x in found.starts.items() if not path.startswith(f"effects.{key}.")}
 
         def there(one: ScoredTerm) -> ScoredTerm:
             term = one.term
@@ -596,32 +595,32 @@ class Search:
         trial = refitted(story.data, smaller, candidate, smaller.starts, tell, key=term.name)
         after, before = evidence_of_fit(story.data, story.held, trial.fit, seen.noise), seen.before
         gain = after.log + term.log_share - before.log
-        fits_as_well = after.density + after.unseen > before.density + before.unseen - AS_WELL
+        apart = are_told_apart(gain, after.density + after.unseen - before.density - before.unseen)
         is_its_term = not trial.faults and catalogue_name(key) in find(candidate.name).terms
         if gain < (NAMED if is_its_term else 0.0):
             if key not in NAMES:
-                story.tie(key, candidate.name, gain > -NAMED or fits_as_well)
+                story.tie(key, candidate.name, not apart)
             return False
         if trial.faults or key in NAMES:
             story.remove(key, smaller)
             story.add(trial)
         else:
-            was = next(one for one in story.added if one.key == key)
+            place = next(i for i, one in enumerate(story.added) if one.key == key)
+            was = story.added[place]
             story.swap(key, trial)
-            self._is_instead(candidate.name, was, gain)
+            self._is_instead(story.added[place], was, gain)
         return True
 
-    def _is_instead(self, name: str, was: Added, gain: float) -> None:
+    def _is_instead(self, new: Added, was: Added, gain: float) -> None:
         """An effect is as probable as what it took the place of, which is less so by that logarithm."""
-        story, whole = self.story, was.probability
-        key = next(one.key for one in story.added if one.name == name)
+        story, key, whole = self.story, new.key, was.probability
         if gain < NAMED:
             story.tie(key, was.name, True)
         if whole is None:
             return
         share = 1.0 / (1.0 + math.exp(-gain))
         story.set_probability(key, whole if gain < NAMED else share * whole)
-        now = {name: share * whole, was.name: (1.0 - share) * whole}
+        now = {new.name: share * whole, was.name: (1.0 - share) * whole}
         self._first = [replace(one, probability=now.get(one.name, one.probability)) for one in self._first]
 
 

@@ -397,14 +397,15 @@ def _trial(one):
 def test_what_takes_the_place_of_an_effect_is_as_probable_as_that_was(gain, told, tied):
     said: dict[str, float] = {}
     ties: list[str] = []
+    new = SimpleNamespace(name="dry_friction", key="dry_friction")
+    was = SimpleNamespace(name="current_sensor_gain", probability=1.0)
     story = SimpleNamespace(
-        added=(SimpleNamespace(name="dry_friction", key="dry_friction"),),
         set_probability=said.__setitem__,
         tie=lambda key, name, equal: ties.append(name),
     )
     of = search.Search(story)
     of._first = [Candidate("current_sensor_gain", 1.0, {}, probability=1.0), Candidate("dry_friction", 0.0, {})]
-    of._is_instead("dry_friction", SimpleNamespace(name="current_sensor_gain", probability=1.0), gain)
+    of._is_instead(new, was, gain)
     assert said["dry_friction"] == pytest.approx(told, abs=1e-4), "of both, where they are not told apart"
     assert ties == (["current_sensor_gain"] if tied else [])
     probable = {one.name: one.probability for one in of._first}

@@ -10,7 +10,7 @@ import urllib.request
 import numpy as np
 import pytest
 from support.comparison_by_hand import comparison as by_hand
-from support.on_page import choose, wait_until
+from support.on_page import choose, wait_until, wait_until_at_rest
 
 from ema_model.recordings.window import reading
 from emaviz.figures import lines, runs
@@ -90,18 +90,6 @@ def test_recordings_are_laid_over_each_other_from_their_events_on():
 @pytest.fixture
 def page(shared_page):
     return shared_page
-
-
-def at_rest(page, chart):
-    """Waits until the chart is there and no longer moves as what stands around it is drawn."""
-    seen = [None]
-
-    def rests():
-        page.wait_for_timeout(250)
-        seen.append(page.evaluate(chart))
-        return seen[-1] is not None and seen[-1] == seen[-2]
-
-    wait_until(rests, 60.0)
 
 
 def click(page, chart, share):
@@ -203,7 +191,7 @@ def test_compared_recordings_are_measured_one_by_one_and_over_each_other(page, a
     comparison = by_hand(("one", "two"))
     page.get_by_role("tab", name="Compare", exact=True).click()
     app.screen.post("comparison", lambda: app.tab(CompareTab).result.show(comparison))
-    at_rest(page, FIGURE)
+    wait_until_at_rest(page, FIGURE)
     start, end = page.evaluate(FIGURE)[4:6]
     drag(page, FIGURE, 0.5, 0.75)
     shows(page, FIGURE, (start + 0.5 * (end - start), start + 0.75 * (end - start)), 0.02)
@@ -212,7 +200,7 @@ def test_compared_recordings_are_measured_one_by_one_and_over_each_other(page, a
     shows(page, FIGURE, (start, end), 0.001)
     choose(page, "Measurement", "all, over each other")
     wait_until(lambda: page.evaluate(FIGURE)[6] == 4, 20.0)
-    at_rest(page, FIGURE)
+    wait_until_at_rest(page, FIGURE)
     click(page, FIGURE, 0.3)
     page.wait_for_timeout(450)
     click(page, FIGURE, 0.7)

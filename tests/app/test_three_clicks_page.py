@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from support.clicks import Clicks
 from support.comparison_by_hand import comparison as by_hand
-from support.on_page import wait_until
+from support.on_page import wait_until, wait_until_at_rest
 
 from ema_model.recordings.window import reading
 from emaviz.page.compare import CompareTab
@@ -49,9 +49,10 @@ def at(page, share):
 
 
 def two_cursors(page, clicks):
-    """Both times in the chart of the current."""
-    for share in (0.2, 0.6):
+    """Both times in the chart of the current, each once the one before is read."""
+    for i, share in enumerate((0.2, 0.6)):
         clicks.at(*at(page, share))
+        wait_until(lambda i=i: page.evaluate("window.emavizMeasure.cursors()")[i] is not None, 20.0)
         page.wait_for_timeout(450)  # no double click
     page.get_by_role("button", name="Zoom to A – B").wait_for()
     return page.evaluate("window.emavizMeasure.cursors()")
@@ -59,12 +60,13 @@ def two_cursors(page, clicks):
 
 @pytest.fixture
 def explored(page, app):
-    """Explore's charts of a step, without cursors."""
+    """Explore's charts of a step, at rest and without cursors."""
     app.session.settings.set("command", "step")
     app.session.refresh()
     wait_until(lambda: app.session.simulation.command == "step")
     run = app.session.simulation.reference
     wait_until(lambda: abs(page.evaluate(LIVE)[5] - run.time_s[-1]) < 0.02)
+    wait_until_at_rest(page, LIVE)
     yield run
     page.keyboard.press("Escape")
     page.locator(".emaviz-measure-line").first.wait_for(state="detached")

@@ -15,6 +15,19 @@ def wait_until(condition, seconds=240.0):
         pause_s = min(1.3 * pause_s, 0.1)  # to ask a page takes milliseconds of its core and of ours
 
 
+def wait_until_at_rest(page, told):
+    """Until what the page tells of a chart is there and stays: a chart moves as what stands around it is drawn."""
+    seen = [None]
+
+    def rests():
+        page.wait_for_timeout(250)
+        seen.append(page.evaluate(told))
+        return seen[-1] is not None and seen[-1] == seen[-2]
+
+    wait_until(lambda: page.evaluate("!!window.emavizMeasure"))  # a new page has its charts before its scripts
+    wait_until(rests, 60.0)
+
+
 def field(page, label):
     """The input beside a label."""
     row = page.locator(f'xpath=//label[normalize-space(.)="{label}"]').locator(

@@ -135,6 +135,7 @@ def test_a_run_is_measured_zoomed_and_looked_into(page, app, tmp_path):
     wait_until(lambda: app.session.simulation.command == "step" and page.evaluate(LIVE)[6] > 0.8 * lines.POINTS)
     run = app.session.simulation.reference
     shows(page, LIVE, (run.time_s[0], run.time_s[-1]), 0.02)  # and not the run before it
+    wait_until_at_rest(page, LIVE)
     start, end = span(page, LIVE)
     click(page, LIVE, 0.2)
     page.get_by_text("Click once more for B").wait_for()

@@ -25,7 +25,7 @@ from ema_model.effects.effect import STAGES
 from ema_model.estimation.floor import BAND_SIGMAS
 from ema_model.faults import cause_of, causes
 from ema_model.quantities import ROTARY, Axes, Quantity, in_sentence, number, of_residual, of_variable, variable_title
-from ema_model.simulation.with_effect import SHOWN, WithEffect, few_periods
+from ema_model.simulation.run import SHOWN, WithEffect, few_periods
 from emaviz.colours import DIFFERENCE, FITTED, HELD_OUT, MONITOR, REFERENCE
 from emaviz.figures import theme
 from emaviz.figures.lines import Lines, LiveLines

@@ -9,7 +9,7 @@ import viser
 
 from ema_model.effects import CATALOGUE, Effect, find
 from ema_model.faults import HEALTHY
-from ema_model.simulation.with_effect import RUNS, WithEffect
+from ema_model.simulation.run import RUNS, WithEffect
 from emaviz.figures.discovery import EffectCharts, picture, small_picture
 from emaviz.page.discover_candidate import about
 from emaviz.page.panel import JobLine

@@ -23,8 +23,7 @@ from ema_model.identification.search import Objective
 from ema_model.quantities import in_sentence
 from ema_model.recordings import Measurement
 from ema_model.simulation import plant
-from ema_model.simulation.run import Run, simulate_monitor, simulate_monitors
-from ema_model.simulation.with_effect import RUNS, EffectRuns, WithEffect
+from ema_model.simulation.run import RUNS, EffectRuns, Run, WithEffect, simulate_monitor, simulate_monitors
 from emaviz.session.identify import Identifying, inputs_of
 from emaviz.session.jobs import Job, Signal, Tell, Worker, report
 from emaviz.session.session_file import Inputs

@@ -12,7 +12,7 @@ from ema_model.effects.user.torque import KEYS, TITLES
 from ema_model.errors import InputError, quoted
 from ema_model.files.written import whole_file
 from ema_model.quantities import VARIABLES, Axes
-from ema_model.simulation.with_effect import EffectRuns
+from ema_model.simulation.run import EffectRuns
 from emaviz.figures.discovery import effect_residual_legend, pictures
 from emaviz.text.html import mathml
 from emaviz.views.export import escape, paragraph, table

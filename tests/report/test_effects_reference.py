@@ -13,8 +13,7 @@ from ema_model.actuator import load_actuator
 from ema_model.effects import CATALOGUE
 from ema_model.effects.user.torque import KEYS
 from ema_model.quantities import variable_title
-from ema_model.simulation.run import simulate_monitor
-from ema_model.simulation.with_effect import RUNS, EffectRuns, WithEffect, few_periods
+from ema_model.simulation.run import RUNS, EffectRuns, WithEffect, few_periods, simulate_monitor
 from emaviz.figures.discovery import SEVERITIES, picture, pictures
 from emaviz.views.effects import write_effects_reference
 

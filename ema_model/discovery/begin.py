@@ -16,8 +16,7 @@ from ema_model.discovery.history import Step, Story, rung_of
 from ema_model.discovery.observed.repeated import by_inverse_dynamics, is_lost, with_divergence
 from ema_model.discovery.refit import settings_in, together
 from ema_model.discovery.result import Change
-from ema_model.discovery.scoring import scored_terms
-from ema_model.discovery.terms import noise_of, terms_of
+from ema_model.discovery.terms import noise_of, scored_terms, terms_of
 from ema_model.discovery.words import NOT_REPEATABLE, OPEN_LOOP_LEFT
 from ema_model.errors import InputError
 from ema_model.estimation.model_fit import Data, fit, floor_ratio, gather, in_floors_of, with_effect

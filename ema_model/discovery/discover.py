@@ -13,11 +13,10 @@ from ema_model.discovery.history import ShownFit, Story, refreshed
 from ema_model.discovery.inverse import other_loop, support_of
 from ema_model.discovery.next_experiment import next_experiment
 from ema_model.discovery.observed.repeated import repeated
-from ema_model.discovery.remaining import lasts, left_by, silence, within_band
+from ema_model.discovery.remaining import free_simulation, lasts, left_by, silence, within_band
 from ema_model.discovery.result import Added, Candidate, Discovery, Experiment, errors_of, misses_unseen
 from ema_model.discovery.search import NO_LIMIT, search
 from ema_model.discovery.uncertainty import outside_tolerance, with_intervals
-from ema_model.discovery.verify import free_simulation
 from ema_model.discovery.words import as_well, held_back, mismatch, untold
 from ema_model.effects import CATALOGUE
 from ema_model.errors import InputError, quoted

@@ -22,8 +22,7 @@ from ema_model.discovery.observed.transmission import TransmissionSeen, TwoMasse
 from ema_model.discovery.refit import Trial, fitted_to_the_end, refitted, stands_for, without_fault
 from ema_model.discovery.remaining import Left, at_floor, left_by
 from ema_model.discovery.result import Added, Candidate, Change, Contradiction, Rung, StoodIn
-from ema_model.discovery.scoring import evidence_of_fit
-from ema_model.discovery.terms import noise_of
+from ema_model.discovery.terms import evidence_of_fit, noise_of
 from ema_model.discovery.uncertainty import settled
 from ema_model.effects import CATALOGUE, catalogue_name
 from ema_model.estimation import Calibration

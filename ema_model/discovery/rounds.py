@@ -15,8 +15,17 @@ from ema_model.discovery.history import Story
 from ema_model.discovery.refit import Trial
 from ema_model.discovery.remaining import ratio
 from ema_model.discovery.result import Candidate
-from ema_model.discovery.scoring import AboutFit, Evident, ScoredTerm, evidence_of_fit, scored_terms
-from ema_model.discovery.terms import Term, hidden, noise_of, terms_of
+from ema_model.discovery.terms import (
+    AboutFit,
+    Evident,
+    ScoredTerm,
+    Term,
+    evidence_of_fit,
+    hidden,
+    noise_of,
+    scored_terms,
+    terms_of,
+)
 from ema_model.effects import CATALOGUE, catalogue_name
 from ema_model.estimation.model_fit import Data, Fit
 from ema_model.estimation.noise import NoiseModel

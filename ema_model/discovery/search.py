@@ -15,7 +15,6 @@ import numpy as np
 
 from ema_model.comparison.explain import Explanation
 from ema_model.comparison.verdict import most_of_floor
-from ema_model.discovery.contradictions import contradictions, goes_by_angle, put_right
 from ema_model.discovery.criteria import (
     FAR,
     HALF,
@@ -32,13 +31,21 @@ from ema_model.discovery.curve import is_a_shape
 from ema_model.discovery.evidence import evidence_of, gains_of
 from ema_model.discovery.history import Story
 from ema_model.discovery.inverse import Opinion, compared, second_opinion, taken_over
-from ema_model.discovery.objections import implausible, unmeasured, unsteady, within
+from ema_model.discovery.objections import (
+    contradictions,
+    goes_by_angle,
+    implausible,
+    put_right,
+    unmeasured,
+    unsteady,
+    within,
+)
 from ema_model.discovery.observed.transmission import transmission_seen, two_masses_seen
 from ema_model.discovery.refit import Trial, fitted_to_the_end, refitted
 from ema_model.discovery.remaining import at_floor, ratio, told_ratio, within_band
 from ema_model.discovery.result import Added, Candidate
 from ema_model.discovery.rounds import Contender, Refits, Round, Rounds, are_told_apart
-from ema_model.discovery.scoring import AboutFit, ScoredTerm, evidence_of_fit, places_of
+from ema_model.discovery.terms import AboutFit, ScoredTerm, evidence_of_fit, places_of
 from ema_model.effects import CATALOGUE, catalogue_name, find
 from ema_model.estimation.model_fit import Data, Fit, fit, holdout_fit
 from ema_model.faults import NAMES, causes

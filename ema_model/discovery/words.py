@@ -20,6 +20,7 @@ from ema_model.comparison.result import free_simulation
 from ema_model.comparison.verdict import ORDER_OF_PRIMARY
 from ema_model.discovery.criteria import FAR
 from ema_model.discovery.observed.controller import ControllerSeen
+from ema_model.discovery.remaining import Verified
 from ema_model.discovery.result import (
     SIGNS,
     Added,
@@ -33,7 +34,6 @@ from ema_model.discovery.result import (
     of_orders,
     rung_label,
 )
-from ema_model.discovery.verify import Verified
 from ema_model.effects import find
 from ema_model.effects.effect import FAMILIES
 from ema_model.estimation import Calibrated

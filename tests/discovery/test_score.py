@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from ema_model.actuator import Tolerance, load_actuator
-from ema_model.discovery import refit, scoring, terms
+from ema_model.discovery import refit, terms
 from ema_model.discovery.evidence import Unknowns
 from ema_model.discovery.fingerprints import Fingerprint
 from ema_model.effects import find
@@ -95,13 +95,13 @@ def test_the_evidence_of_a_model_does_not_depend_on_where_its_fit_ended(monkeypa
     def told(x):
         columns = noise.coefficients(np.stack([x[1] * shape, x[0] * shape], axis=1) * 20.0)
         unknowns = Unknowns(columns, 1.0 - x, sigma, np.full(2, -9.0), np.full(2, 9.0))
-        about = scoring.AboutFit(unknowns, noise.coefficients(left(x)[0]))
+        about = terms.AboutFit(unknowns, noise.coefficients(left(x)[0]))
         problem = SimpleNamespace(residuals=left, clip=lambda points: points, values=PIECE)
-        monkeypatch.setattr(scoring.AboutFit, "of", lambda found, noise: about)
-        monkeypatch.setattr(scoring, "problem_of", lambda *args, **options: problem)
-        monkeypatch.setattr(scoring, "places_beside", lambda found: [])
+        monkeypatch.setattr(terms.AboutFit, "of", lambda found, noise: about)
+        monkeypatch.setattr(terms, "problem_of", lambda *args, **options: problem)
+        monkeypatch.setattr(terms, "places_beside", lambda found: [])
         found = SimpleNamespace(plant=None, calibration=SimpleNamespace(free=(), x=x))
-        return scoring.evidence_of_fit(SimpleNamespace(floors=(), signals={}), None, found, noise).log
+        return terms.evidence_of_fit(SimpleNamespace(floors=(), signals={}), None, found, noise).log
 
     near, far = (told(np.array(x)) for x in ((1.01, 1.98), (1.8, 1.0)))
     assert far == pytest.approx(near, abs=1.0)

@@ -11,7 +11,7 @@ from ema_model.discovery.evidence import Unknowns, evidence_of, gains_of
 from ema_model.discovery.history import Step, Story
 from ema_model.discovery.refit import Trial
 from ema_model.discovery.result import Added, Candidate, effect_title
-from ema_model.discovery.scoring import Evident
+from ema_model.discovery.terms import Evident
 from ema_model.estimation.noise import PIECE, NoiseModel
 from ema_model.quantities import in_sentence
 

@@ -33,8 +33,8 @@ FLOORS = {
         ["api"],
     ],
     "ema_model.discovery": [
-        ["criteria"],
-        ["observed"],
+        ["thresholds"],
+        ["loop", "transmission"],
         ["result"],
         ["evidence", "fingerprints", "refit", "remaining", "uncertainty"],
         ["curve", "next_experiment", "terms", "words"],

@@ -22,7 +22,7 @@ from ema_model.campaign.benchmark import BENCHMARK
 from ema_model.campaign.task import FLAG, NUMBER, NUMBERS, TEXT, TEXTS, Kind, TaskInputs
 from ema_model.comparison import compare
 from ema_model.comparison.compare import weights_of
-from ema_model.comparison.criteria import BAND
+from ema_model.comparison.thresholds import BAND
 from ema_model.discovery import discover
 from ema_model.errors import InputError, quoted
 from ema_model.estimation.calibrate import problem_of

@@ -21,7 +21,7 @@ from ema_model.effects import find
 from ema_model.errors import InputError, did_you_mean, quoted
 from ema_model.estimation import Calibration, Floor, after_fit, floor, of_unseen, taken_up
 from ema_model.estimation import calibrate as fit
-from ema_model.estimation.floor import as_it_is, band, least, spread, tells_nothing, twin_errors
+from ema_model.estimation.noise import as_it_is, band, least, spread, tells_nothing, twin_errors
 from ema_model.estimation.problem import SIGNALS
 from ema_model.faults import checked, named
 from ema_model.models import Model, Window, model_for

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from ema_model.comparison.residuals import Residuals
 from ema_model.estimation import Floor
-from ema_model.estimation.floor import POSITIONS, SPEED, band, least, spread
+from ema_model.estimation.noise import POSITIONS, SPEED, band, least, spread
 from ema_model.models import Window
 from ema_model.quantities import number
 from ema_model.text import Severity

@@ -14,9 +14,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ema_model.actuator import Actuator
-from ema_model.comparison.criteria import AT_BOUNDS, LAG_APART, LAG_SAMPLES, MISSED
+from ema_model.comparison.thresholds import AT_BOUNDS, LAG_APART, LAG_SAMPLES, MISSED
 from ema_model.estimation import Calibration
-from ema_model.estimation.floor import POSITIONS
+from ema_model.estimation.noise import POSITIONS
 from ema_model.models import Model, Window
 from ema_model.quantities import number
 

@@ -13,7 +13,10 @@ from msgspec import Meta
 from numpy.typing import NDArray
 
 from ema_model.actuator import Actuator
-from ema_model.comparison.criteria import (
+from ema_model.comparison.error_in_floors import ratio
+from ema_model.comparison.explain import Explanation, modulator_of, quantile_knots, used_blocks, without_spikes
+from ema_model.comparison.residuals import Residuals, event_sentence, range_text, region_sentence
+from ema_model.comparison.thresholds import (
     BAND,
     EVENT_AT_ONCE,
     EVENT_BEYOND_DRIFT,
@@ -22,9 +25,6 @@ from ema_model.comparison.criteria import (
     EVENT_SHARE,
     EVENT_T,
 )
-from ema_model.comparison.error_in_floors import ratio
-from ema_model.comparison.explain import Explanation, modulator_of, quantile_knots, used_blocks, without_spikes
-from ema_model.comparison.residuals import Residuals, event_sentence, range_text, region_sentence
 from ema_model.quantities import Axes
 from ema_model.recordings import SIGNALS
 from ema_model.result import NULL, as_named

@@ -60,7 +60,7 @@ class SignalError:
     ]
     mean_absolute: Annotated[float, Meta(description="mean of |measurement − model|", extra=NULL)]
     signal_rms: float = math.nan  # of what was measured; of a position about its mean
-    silent: str = ""  # why the signal tells nothing of the model, as of `estimation.floor.tells_nothing`
+    silent: str = ""  # why the signal tells nothing of the model, as of `estimation.noise.tells_nothing`
     in_floors: OverFloor = UNKNOWN  # the error over the floor of the same moment; no quotient of the numbers above
     is_counted: Annotated[
         bool, as_named("counted", "whether the pooled over_floor counts it; a speed beside a position: no")

@@ -10,14 +10,14 @@ from numpy.typing import NDArray
 
 from ema_model.actuator import Actuator
 from ema_model.actuator.parameters import on_axes
-from ema_model.comparison.criteria import BEYOND, SLOW
 from ema_model.comparison.error_in_floors import OverFloor, is_counted, ratio
 from ema_model.comparison.explain import Explanation, Order, explain, residual_orders, used_blocks
 from ema_model.comparison.regions import Event, Region, events, worst_regions
 from ema_model.comparison.residuals import OPEN_LOOP, Residuals, dependence, order_sentence
 from ema_model.comparison.result import Compared, SignalError
+from ema_model.comparison.thresholds import BEYOND, SLOW
 from ema_model.estimation import Calibration
-from ema_model.estimation.floor import CONSTANT, CORRELATED_S, ORDER_OF_PRIMARY
+from ema_model.estimation.noise import CONSTANT, CORRELATED_S, ORDER_OF_PRIMARY
 from ema_model.quantities import Quantity, all_of, in_sentence, of_residual, of_signal
 from ema_model.recordings import SIGNALS
 

@@ -11,12 +11,12 @@ from ema_model.comparison.compare import weights_of
 from ema_model.comparison.loop_lag import other_controller
 from ema_model.comparison.residuals import OPEN_LOOP
 from ema_model.comparison.result import Comparison
-from ema_model.discovery.criteria import FAR
 from ema_model.discovery.history import Step, Story, rung_of
-from ema_model.discovery.observed.repeated import by_inverse_dynamics, is_lost, with_divergence
+from ema_model.discovery.loop import by_inverse_dynamics, is_lost, with_divergence
 from ema_model.discovery.refit import settings_in, together
 from ema_model.discovery.result import Change
 from ema_model.discovery.terms import noise_of, scored_terms, terms_of
+from ema_model.discovery.thresholds import FAR
 from ema_model.discovery.words import NOT_REPEATABLE, OPEN_LOOP_LEFT
 from ema_model.errors import InputError
 from ema_model.estimation.model_fit import Data, fit, floor_ratio, gather, in_floors_of, with_effect

@@ -11,8 +11,8 @@ from ema_model.comparison.result import Comparison
 from ema_model.discovery.begin import begun
 from ema_model.discovery.history import ShownFit, Story, refreshed
 from ema_model.discovery.inverse import other_loop, support_of
+from ema_model.discovery.loop import repeated
 from ema_model.discovery.next_experiment import next_experiment
-from ema_model.discovery.observed.repeated import repeated
 from ema_model.discovery.remaining import free_simulation, lasts, left_by, silence, within_band
 from ema_model.discovery.result import Added, Candidate, Discovery, Experiment, errors_of, misses_unseen
 from ema_model.discovery.search import NO_LIMIT, search

@@ -14,15 +14,15 @@ from ema_model.comparison.explain import Explanation
 from ema_model.comparison.free_simulation import Simulated
 from ema_model.comparison.loop_lag import LoopLag
 from ema_model.comparison.regions import Event
-from ema_model.discovery.criteria import FAR, HALF, NAMED
 from ema_model.discovery.curve import curve_trial
 from ema_model.discovery.fingerprints import Fingerprint, fingerprints, may_act, of_the_file
-from ema_model.discovery.observed.controller import ControllerSeen
-from ema_model.discovery.observed.transmission import TransmissionSeen, TwoMasses
+from ema_model.discovery.loop import ControllerSeen
 from ema_model.discovery.refit import Trial, fitted_to_the_end, refitted, stands_for, without_fault
 from ema_model.discovery.remaining import Left, at_floor, left_by
 from ema_model.discovery.result import Added, Candidate, Change, Contradiction, Rung, StoodIn
 from ema_model.discovery.terms import evidence_of_fit, noise_of
+from ema_model.discovery.thresholds import FAR, HALF, NAMED
+from ema_model.discovery.transmission import TransmissionSeen, TwoMasses
 from ema_model.discovery.uncertainty import settled
 from ema_model.effects import CATALOGUE, catalogue_name
 from ema_model.estimation import Calibration

@@ -11,15 +11,14 @@ from dataclasses import dataclass, replace
 
 from ema_model.actuator import Actuator, Tolerance
 from ema_model.actuator.parameters import INVERSE_PLACES
-from ema_model.comparison.criteria import BAND, MISSED
 from ema_model.comparison.loop_lag import LoopLag
+from ema_model.comparison.thresholds import BAND, MISSED
 from ema_model.discovery.begin import calibrated_story
-from ema_model.discovery.criteria import APART, GONE, HALF, HEARD, LOOP_TOLD, MUCH_BETTER, NAMED
 from ema_model.discovery.history import Story
-from ema_model.discovery.observed.controller import ControllerSeen, controller_seen
-from ema_model.discovery.observed.repeated import by_inverse_dynamics
+from ema_model.discovery.loop import ControllerSeen, by_inverse_dynamics, controller_seen
 from ema_model.discovery.remaining import at_floor, ratio
 from ema_model.discovery.result import Added, Candidate, Change
+from ema_model.discovery.thresholds import APART, GONE, HALF, HEARD, LOOP_TOLD, MUCH_BETTER, NAMED
 from ema_model.discovery.uncertainty import with_intervals
 from ema_model.discovery.words import LOOP_UNTOLD
 from ema_model.effects import CATALOGUE, find

@@ -18,8 +18,8 @@ from ema_model.commands import command
 from ema_model.discovery.refit import Trial
 from ema_model.discovery.result import Experiment
 from ema_model.estimation.calibrate import problem_of
-from ema_model.estimation.floor import Floor, floor
 from ema_model.estimation.model_fit import Data, Fit
+from ema_model.estimation.noise import Floor, floor
 from ema_model.estimation.problem import SIGNALS, Problem
 from ema_model.faults import NAMES
 from ema_model.models import ClosedLoop, Model

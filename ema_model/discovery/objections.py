@@ -11,7 +11,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ema_model.actuator.parameters import on_axes
-from ema_model.discovery.criteria import (
+from ema_model.discovery.fingerprints import greatest, travel
+from ema_model.discovery.history import Story
+from ema_model.discovery.remaining import ratio
+from ema_model.discovery.result import Contradiction
+from ema_model.discovery.thresholds import (
     ANOTHER,
     APART,
     DISAGREES,
@@ -22,10 +26,6 @@ from ema_model.discovery.criteria import (
     SHARED,
     WIDER,
 )
-from ema_model.discovery.fingerprints import greatest, travel
-from ema_model.discovery.history import Story
-from ema_model.discovery.remaining import ratio
-from ema_model.discovery.result import Contradiction
 from ema_model.discovery.uncertainty import colour, signals_of
 from ema_model.effects import catalogue_name, find
 from ema_model.effects.effect import ANGLES

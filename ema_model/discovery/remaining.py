@@ -11,16 +11,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ema_model.actuator import Actuator, load_actuator
-from ema_model.comparison.criteria import BAND
 from ema_model.comparison.explain import Explanation, Order, advance_of, explain, orders_in, pitches, used_blocks
 from ema_model.comparison.explain import orders as orders_of
 from ema_model.comparison.free_simulation import Simulated, in_open_loop, is_by_motion, pairs, scored
 from ema_model.comparison.regions import Event, events
 from ema_model.comparison.residuals import Residuals, residuals_of
+from ema_model.comparison.thresholds import BAND
 from ema_model.comparison.verdict import ORDER_OF_PRIMARY, lasting, most_of_floor
 from ema_model.discovery.result import Discovery, Rung
-from ema_model.estimation.floor import silent
 from ema_model.estimation.model_fit import Data, Fit, floor_ratio, holdout_signals, resimulated
+from ema_model.estimation.noise import silent
 from ema_model.models import Window, model_for
 from ema_model.models.measured_motion import evaluation_stretches
 from ema_model.models.model import Signals

@@ -18,10 +18,9 @@ from ema_model.comparison.explain import Explanation
 from ema_model.comparison.free_simulation import FreeError, Simulated, errors_in_units
 from ema_model.comparison.loop_lag import LoopLag
 from ema_model.comparison.regions import Event
-from ema_model.discovery.criteria import FAR
-from ema_model.discovery.observed.controller import ControllerSeen
-from ema_model.discovery.observed.repeated import Repeated
-from ema_model.discovery.observed.transmission import TransmissionSeen, TwoMasses
+from ema_model.discovery.loop import ControllerSeen, Repeated
+from ema_model.discovery.thresholds import FAR
+from ema_model.discovery.transmission import TransmissionSeen, TwoMasses
 from ema_model.effects import CATALOGUE, find
 from ema_model.errors import InputError
 from ema_model.estimation import Calibrated, Calibration, Floor

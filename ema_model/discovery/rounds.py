@@ -8,7 +8,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ema_model.discovery.criteria import ANY_MISSING, AS_WELL, FAR, HALF, NAMED
 from ema_model.discovery.evidence import evidence_of, gains_of
 from ema_model.discovery.fingerprints import Fingerprint, fingerprints
 from ema_model.discovery.history import Story
@@ -26,6 +25,7 @@ from ema_model.discovery.terms import (
     scored_terms,
     terms_of,
 )
+from ema_model.discovery.thresholds import ANY_MISSING, AS_WELL, FAR, HALF, NAMED
 from ema_model.effects import CATALOGUE, catalogue_name
 from ema_model.estimation.model_fit import Data, Fit
 from ema_model.estimation.noise import NoiseModel

@@ -15,18 +15,6 @@ import numpy as np
 
 from ema_model.comparison.explain import Explanation
 from ema_model.comparison.verdict import most_of_floor
-from ema_model.discovery.criteria import (
-    FAR,
-    HALF,
-    LARGEST_GROUP,
-    LEAST_FALL,
-    LOOP_TOLD,
-    MIGHT,
-    NAMED,
-    SHAPES,
-    TOLD_WELL,
-    WORTH_A_REFIT,
-)
 from ema_model.discovery.curve import is_a_shape
 from ema_model.discovery.evidence import evidence_of, gains_of
 from ema_model.discovery.history import Story
@@ -40,12 +28,24 @@ from ema_model.discovery.objections import (
     unsteady,
     within,
 )
-from ema_model.discovery.observed.transmission import transmission_seen, two_masses_seen
 from ema_model.discovery.refit import Trial, fitted_to_the_end, refitted
 from ema_model.discovery.remaining import at_floor, ratio, told_ratio, within_band
 from ema_model.discovery.result import Added, Candidate
 from ema_model.discovery.rounds import Contender, Refits, Round, Rounds, are_told_apart
 from ema_model.discovery.terms import AboutFit, ScoredTerm, evidence_of_fit, places_of
+from ema_model.discovery.thresholds import (
+    FAR,
+    HALF,
+    LARGEST_GROUP,
+    LEAST_FALL,
+    LOOP_TOLD,
+    MIGHT,
+    NAMED,
+    SHAPES,
+    TOLD_WELL,
+    WORTH_A_REFIT,
+)
+from ema_model.discovery.transmission import transmission_seen, two_masses_seen
 from ema_model.effects import CATALOGUE, catalogue_name, find
 from ema_model.estimation.model_fit import Data, Fit, fit, holdout_fit
 from ema_model.faults import NAMES, causes

@@ -12,12 +12,12 @@ from numpy.typing import NDArray
 
 from ema_model.comparison.explain import Explanation
 from ema_model.comparison.residuals import Residuals, residuals_of
-from ema_model.discovery.criteria import WORTH_A_LOOK
 from ema_model.discovery.history import Step, Story
 from ema_model.discovery.remaining import Left
 from ema_model.discovery.result import Added, Candidate, Discovery
 from ema_model.discovery.rounds import Refits, Rounds
 from ema_model.discovery.search import refits_beside
+from ema_model.discovery.thresholds import WORTH_A_LOOK
 from ema_model.discovery.words import primary
 from ema_model.effects import find
 from ema_model.effects.user import Expression

@@ -13,13 +13,12 @@ from numpy.typing import NDArray
 from ema_model.actuator import Actuator
 from ema_model.actuator.actuator import sentences as phrases_of
 from ema_model.actuator.parameters import on_axes
-from ema_model.comparison.criteria import BAND
 from ema_model.comparison.loop_lag import BLAMED, LoopLag
 from ema_model.comparison.residuals import dependence
 from ema_model.comparison.result import free_simulation
+from ema_model.comparison.thresholds import BAND
 from ema_model.comparison.verdict import ORDER_OF_PRIMARY
-from ema_model.discovery.criteria import FAR
-from ema_model.discovery.observed.controller import ControllerSeen
+from ema_model.discovery.loop import ControllerSeen
 from ema_model.discovery.remaining import Verified
 from ema_model.discovery.result import (
     SIGNS,
@@ -34,6 +33,7 @@ from ema_model.discovery.result import (
     of_orders,
     rung_label,
 )
+from ema_model.discovery.thresholds import FAR
 from ema_model.effects import find
 from ema_model.effects.effect import FAMILIES
 from ema_model.estimation import Calibrated

@@ -11,7 +11,7 @@ from ema_model.estimation.calibrate import (
     of_unseen,
     taken_up,
 )
-from ema_model.estimation.floor import Floor, floor
+from ema_model.estimation.noise import Floor, floor
 
 __all__ = [
     "Calibrated",

@@ -13,9 +13,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from ema_model.actuator import Actuator
 from ema_model.actuator.parameters import on_axes
-from ema_model.estimation.floor import CORRELATED_S, DRAWS, Floor, local_rms
 from ema_model.estimation.information import Combination, by_pieces, covariance_of, known_together, measured, posterior
 from ema_model.estimation.least_squares import descended
+from ema_model.estimation.noise import CORRELATED_S, DRAWS, Floor, local_rms
 from ema_model.estimation.problem import (
     ECCENTRICITY,
     K_SIGMA,

@@ -14,7 +14,7 @@ from ema_model.actuator import Actuator, Tolerance
 from ema_model.effects import find
 from ema_model.effects.effect import ANGLES
 from ema_model.estimation import Calibration, Floor, after_fit, calibrate, default_free, floor, of_unseen, taken_up
-from ema_model.estimation.floor import as_it_is, band, least, spread, twin_errors
+from ema_model.estimation.noise import as_it_is, band, least, spread, twin_errors
 from ema_model.estimation.problem import fitted_signals
 from ema_model.models import Model, model_for
 from ema_model.models.model import Signals

@@ -14,7 +14,7 @@ from ema_model.actuator import Actuator
 from ema_model.actuator.parameters import low_limit, on_axes
 from ema_model.effects import find
 from ema_model.errors import InputError, did_you_mean, quoted
-from ema_model.estimation.floor import POSITIONS, SPEED, Floor
+from ema_model.estimation.noise import POSITIONS, SPEED, Floor
 from ema_model.faults import NAMES
 from ema_model.models import Model, Window
 from ema_model.models.closed_loop import LOAD

@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 from ema_model.actuator import Actuator
 from ema_model.discovery.uncertainty import colour
 from ema_model.estimation import Floor, calibrate, default_free, floor
-from ema_model.estimation.floor import POSITIONS
 from ema_model.estimation.model_fit import Data
+from ema_model.estimation.noise import POSITIONS
 from ema_model.estimation.problem import SIGNALS, Problem, starts_of, unknowns_of
 from ema_model.identification.fit import TWINS, Twins, twins
 from ema_model.models import Model, model_for

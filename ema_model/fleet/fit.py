@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from scipy.special import chdtri, stdtrit
 
 from ema_model.estimation import Calibration, Floor, after_fit, calibrate
-from ema_model.estimation.floor import twin_errors
+from ema_model.estimation.noise import twin_errors
 from ema_model.fleet.block import (
     WIDER,
     Block,

@@ -12,8 +12,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.ndimage import uniform_filter1d
 
-from ema_model.estimation.floor import CORRELATED_S, Floor, floor
 from ema_model.estimation.least_squares import Descent
+from ema_model.estimation.noise import CORRELATED_S, Floor, floor
 from ema_model.estimation.problem import (
     DIVERGED,
     K_SIGMA,

@@ -13,7 +13,7 @@ from ema_model import quantities
 from ema_model.comparison.regions import Region
 from ema_model.comparison.result import Comparison
 from ema_model.errors import InputError
-from ema_model.estimation.floor import BAND_SIGMAS
+from ema_model.estimation.noise import BAND_SIGMAS
 from ema_model.quantities import MODULATORS, ROTARY, Axes, Quantity, of_signal, variable_title
 from ema_model.quantities import of_residual as residual_of_signal
 from ema_model.recordings import SIGNALS, ColumnMapping, Measurement, apply_mapping

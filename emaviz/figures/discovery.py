@@ -22,7 +22,7 @@ from ema_model.discovery.snapshot import Look
 from ema_model.discovery.words import Track, effect_title, faults, page_of, rung_title, settings
 from ema_model.effects import Effect, find
 from ema_model.effects.effect import STAGES
-from ema_model.estimation.floor import BAND_SIGMAS
+from ema_model.estimation.noise import BAND_SIGMAS
 from ema_model.faults import cause_of, causes
 from ema_model.quantities import ROTARY, Axes, Quantity, in_sentence, number, of_residual, of_variable, variable_title
 from ema_model.simulation.run import SHOWN, WithEffect, few_periods

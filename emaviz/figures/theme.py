@@ -14,7 +14,7 @@ import numpy as np
 import plotly.graph_objects as go
 from numpy.typing import ArrayLike, NDArray
 
-from ema_model.estimation.floor import BAND_SIGMAS
+from ema_model.estimation.noise import BAND_SIGMAS
 from ema_model.quantities import Quantity, number, round_numbers
 from emaviz.colours import COMMAND, DIFFERENCE, LIMIT, MONITOR, REFERENCE
 from emaviz.text.html import Html, html_escape, unescaped

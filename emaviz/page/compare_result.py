@@ -16,7 +16,7 @@ from ema_model.comparison.regions import Region, worst_moment
 from ema_model.comparison.result import FLOOR_NOTE, Compared, Comparison, details, errors, errors_by_recording, of_floor
 from ema_model.errors import InputError
 from ema_model.estimation.calibrate import calibration_table, together
-from ema_model.estimation.floor import BAND_SIGMAS
+from ema_model.estimation.noise import BAND_SIGMAS
 from ema_model.faults import HEALTHY
 from ema_model.quantities import VARIABLES
 from ema_model.recordings import Measurement

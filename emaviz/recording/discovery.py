@@ -25,7 +25,7 @@ from ema_model.discovery.words import (
 )
 from ema_model.errors import InputError
 from ema_model.estimation.calibrate import calibration_table, convergence, warnings
-from ema_model.estimation.floor import BAND_SIGMAS
+from ema_model.estimation.noise import BAND_SIGMAS
 from ema_model.text import Block, Lines, Note
 from emaviz import colours
 from emaviz.recording import writer as drawn_as

@@ -25,7 +25,7 @@ from ema_model.comparison.result import (
 )
 from ema_model.errors import InputError
 from ema_model.estimation.calibrate import calibration_table, convergence, warnings
-from ema_model.estimation.floor import BAND_SIGMAS
+from ema_model.estimation.noise import BAND_SIGMAS
 from ema_model.quantities import VARIABLES, number, variable_title
 from ema_model.recordings.health import MARKS
 from ema_model.text import Lines, Note, Table

@@ -256,7 +256,7 @@ def _columns(result: Tracked) -> Mapping[str, ArrayLike]:
 
 def _record(result: Tracked, path: Path, configuration: Mapping[str, Any]) -> None:
     """On the timeline of the flights."""
-    from emaviz.recording.tracking import write_tracking  # rerun takes a second to import
+    from emaviz.recording.identification import write_tracking  # rerun takes a second to import
 
     write_tracking(result, path, configuration)
 

@@ -10,9 +10,9 @@ from support.rig import Rig
 
 from ema_model.actuator import load_actuator
 from ema_model.challenges.truth import Truth
-from ema_model.comparison.criteria import BAND
-from ema_model.discovery.criteria import WORTH_A_LOOK
+from ema_model.comparison.thresholds import BAND
 from ema_model.discovery.result import Change
+from ema_model.discovery.thresholds import WORTH_A_LOOK
 from ema_model.discovery.words import faults, headline, sentences
 from ema_model.errors import InputError
 from emaviz.figures import discovery

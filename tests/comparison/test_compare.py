@@ -14,7 +14,7 @@ from ema_model.actuator import load_actuator
 from ema_model.comparison import compare, regions
 from ema_model.comparison.regions import worst_regions
 from ema_model.comparison.residuals import Residuals
-from ema_model.discovery.observed.transmission import transmission_seen
+from ema_model.discovery.transmission import transmission_seen
 from ema_model.errors import InputError
 from ema_model.recordings import SIGNALS, Measurement, read
 from ema_model.recordings.read import prepared

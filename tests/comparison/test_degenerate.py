@@ -14,7 +14,7 @@ from ema_model.commands import command
 from ema_model.comparison import compare
 from ema_model.comparison.result import errors, held_out, verdict
 from ema_model.discovery import discover
-from ema_model.estimation.floor import floor
+from ema_model.estimation.noise import floor
 from ema_model.identification.run import identify
 from ema_model.identification.search import Objective
 from ema_model.models import ClosedLoop, InverseDynamics

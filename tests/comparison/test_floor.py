@@ -17,7 +17,7 @@ from ema_model.comparison.compare import _typical_floor
 from ema_model.comparison.residuals import Residuals
 from ema_model.comparison.verdict import slow_ratio
 from ema_model.estimation import Floor, after_fit, calibrate, floor
-from ema_model.estimation.floor import spread, twin_error
+from ema_model.estimation.noise import spread, twin_error
 from ema_model.models import ClosedLoop
 from ema_model.recordings.measurement import Sensors
 from ema_model.recordings.noise import held

@@ -10,7 +10,7 @@ from support.unknown_drive import drive_of, logged
 
 from ema_model.actuator import Actuator, Tolerance
 from ema_model.comparison import compare
-from ema_model.comparison.criteria import SLOW
+from ema_model.comparison.thresholds import SLOW
 from ema_model.comparison.verdict import slow_ratio
 
 SEEDS = range(12)

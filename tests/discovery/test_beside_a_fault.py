@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 from support.hidden_effects import ACTUATOR, recorded
 
-from ema_model.comparison.criteria import BAND
+from ema_model.comparison.thresholds import BAND
 from ema_model.discovery import discover
 
 COMMANDS = [

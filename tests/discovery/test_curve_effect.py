@@ -16,8 +16,8 @@ from ema_model.discovery.curve import curve_of, is_torque, with_curve
 from ema_model.effects import find
 from ema_model.effects.user import torque_curve, user_torque
 from ema_model.errors import InputError
-from ema_model.estimation.floor import as_it_is, twin_error
 from ema_model.estimation.model_fit import Data, Fit, fit, gather, holdout_error
+from ema_model.estimation.noise import as_it_is, twin_error
 from ema_model.recordings import prepared
 
 COMMANDS = [("chirp", {}, 0.5), ("step", {"final_rad": 0.005}, 0.5), SINE]

@@ -7,7 +7,7 @@ from support.representative import first_of
 
 from ema_model.actuator import load_actuator
 from ema_model.commands import command
-from ema_model.comparison.criteria import BAND
+from ema_model.comparison.thresholds import BAND
 from ema_model.discovery import begun, discover, result_of
 from ema_model.discovery.next_experiment import next_experiment
 from ema_model.discovery.result import Candidate, Change

@@ -9,7 +9,7 @@ import pytest
 
 from ema_model.actuator import load_actuator
 from ema_model.commands import command
-from ema_model.comparison.criteria import BAND
+from ema_model.comparison.thresholds import BAND
 from ema_model.discovery import discover
 from ema_model.discovery.begin import begun
 from ema_model.discovery.discover import result_of

@@ -7,7 +7,7 @@ import pytest
 from support.foreign_rigs import FITTED, HELD, actuator_of, measured, recorded, truth_of
 
 from ema_model.comparison import compare
-from ema_model.comparison.criteria import BAND
+from ema_model.comparison.thresholds import BAND
 from ema_model.discovery import discover
 
 pytestmark = pytest.mark.long

@@ -7,7 +7,7 @@ from support.foreign_rigs import actuator_of, measured, recorded
 
 from ema_model.actuator import load_actuator, save_actuator
 from ema_model.comparison import compare
-from ema_model.comparison.criteria import BAND
+from ema_model.comparison.thresholds import BAND
 from ema_model.discovery import discover
 
 

@@ -14,8 +14,8 @@ from ema_model.discovery import discover
 from ema_model.discovery import inverse as asked
 from ema_model.discovery.begin import begun, calibrated_story
 from ema_model.discovery.inverse import as_logged, second_opinion
+from ema_model.discovery.loop import controller_seen
 from ema_model.discovery.objections import contradictions
-from ema_model.discovery.observed.controller import controller_seen
 from ema_model.models.inverse_dynamics import InverseDynamics
 from ema_model.models.measured_motion import _moving
 

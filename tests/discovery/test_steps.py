@@ -12,13 +12,13 @@ from ema_model.commands import command
 from ema_model.comparison.compare import weights_of
 from ema_model.discovery import discover
 from ema_model.discovery.fingerprints import fingerprints
+from ema_model.discovery.loop import is_lost, with_divergence
 from ema_model.discovery.next_experiment import allowed, next_experiment
-from ema_model.discovery.observed.repeated import is_lost, with_divergence
 from ema_model.discovery.refit import Trial
 from ema_model.discovery.result import Candidate
 from ema_model.discovery.terms import noise_of, scored_terms, terms_of
-from ema_model.estimation.floor import floor
 from ema_model.estimation.model_fit import Fit, fit, gather, with_effect
+from ema_model.estimation.noise import floor
 from ema_model.models import model_for
 from ema_model.recordings import prepared
 from ema_model.recordings.measurement import Sensors

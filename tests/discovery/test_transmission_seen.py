@@ -12,7 +12,7 @@ import pytest
 from support.hidden_effects import ACTUATOR, recorded
 
 from ema_model.discovery.discover import verdict_of
-from ema_model.discovery.observed.transmission import TransmissionSeen, transmission_seen
+from ema_model.discovery.transmission import TransmissionSeen, transmission_seen
 from ema_model.discovery.words import headline
 
 MOTION = ("multisine", {"amplitude_rad": 0.012, "frequencies_Hz": (2, 5, 9)}, 0.6)

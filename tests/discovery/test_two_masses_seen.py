@@ -11,7 +11,7 @@ from support.flexible_drive import LOAD, MOTOR, flexible_drive
 from support.unknown_drive import drive_of, logged
 
 from ema_model.discovery import discover
-from ema_model.discovery.observed.transmission import two_masses_seen
+from ema_model.discovery.transmission import two_masses_seen
 from emaviz.cli import main
 
 CASE = Path(__file__).parents[3] / "shared" / "cases" / "two_mass"

@@ -10,9 +10,9 @@ import pytest
 from support.discovered import with_cogging, with_unknown
 from support.hidden_effects import ACTUATOR, SINE, recorded
 
-from ema_model.comparison.criteria import BAND
 from ema_model.comparison.residuals import Residuals
 from ema_model.comparison.result import SignalError
+from ema_model.comparison.thresholds import BAND
 from ema_model.comparison.verdict import judge, most_of_floor
 from ema_model.discovery import begun, result_of
 from ema_model.discovery.history import Step, rung_of

@@ -9,7 +9,7 @@ import pytest
 
 from ema_model.actuator import load_actuator
 from ema_model.commands import command
-from ema_model.estimation.floor import DRAWS, floor, twin_error
+from ema_model.estimation.noise import DRAWS, floor, twin_error
 from ema_model.faults import HEALTHY, vector
 from ema_model.models import Model, model_for
 from ema_model.recordings.measurement import Sensors

@@ -13,7 +13,7 @@ from ema_model.actuator import Actuator, Tolerance, load_actuator
 from ema_model.actuator.parameters import Inverter
 from ema_model.commands import Recorded, command
 from ema_model.estimation import calibrate, floor
-from ema_model.estimation.floor import as_it_is
+from ema_model.estimation.noise import as_it_is
 from ema_model.faults import HEALTHY
 from ema_model.models import ClosedLoop
 from ema_model.recordings import Measurement

@@ -8,7 +8,7 @@ from collections.abc import Iterable, Mapping
 from typing import Any
 
 from ema_model.actuator.parameters import path_inside
-from ema_model.comparison.criteria import BAND
+from ema_model.comparison.thresholds import BAND
 from ema_model.comparison.verdict import most_of_floor
 from ema_model.effects import CATALOGUE
 from ema_model.quantities import HALF_90

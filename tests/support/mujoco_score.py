@@ -12,10 +12,10 @@ from typing import Any
 
 import ema_model as em
 from ema_model.actuator import Actuator
-from ema_model.comparison.criteria import BAND
 from ema_model.comparison.result import Comparison
+from ema_model.comparison.thresholds import BAND
 from ema_model.discovery import Discovery
-from ema_model.discovery.criteria import LARGEST_GROUP
+from ema_model.discovery.thresholds import LARGEST_GROUP
 
 COLUMNS = ("showable", "right", "exact", "part", "wrong", "silent", "unknown with its variable", "hardly showable")
 # What the two positions show by themselves, by what it goes with.

@@ -1,1 +1,0 @@
-"""What recordings show by themselves, before any effect is tried: controller, transmission, what a rig repeats."""

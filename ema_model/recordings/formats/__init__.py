@@ -1,4 +1,4 @@
-"""The file formats: each other file of this folder is one, found by its `FORMAT`.
+"""The file formats: each other file of this folder holds one, or several, found by its `FORMAT`.
 
 To add a format, add a file with a `FORMAT`: reading, writing and their messages find it.
 """
@@ -34,7 +34,12 @@ def format_of(path: str, known: dict[str, Format] = FORMATS) -> Format:
         raise refusal(path, f"{found}; a measurement ends in {' or '.join(known)}") from None
 
 
-for _one in sorted(
-    members(__name__, "FORMAT").values(), key=lambda one: (one.suffix not in (".csv", ".parquet"), one.write is None)
-):
+def _stated() -> list[Format]:
+    """What the files of this folder state: those that any program reads, what is written, the others."""
+    stated = members(__name__, "FORMAT").values()
+    formats = [one for some in stated for one in (some if isinstance(some, tuple) else (some,))]
+    return sorted(formats, key=lambda one: (one.suffix not in (".csv", ".parquet"), one.write is None, one.suffix))
+
+
+for _one in _stated():
     add_format(_one)

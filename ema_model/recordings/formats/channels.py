@@ -11,7 +11,7 @@ from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, S
 from contextlib import AbstractContextManager, ExitStack, contextmanager
 from dataclasses import dataclass, field, replace
 from functools import partial
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -469,7 +469,7 @@ def _as_numbers(values: Any) -> Array:
 
 
 # --- formats of logs: what a library finds in a file becomes columns on one clock, in a process of its own ------------
-# A format's file gives a function `opened(path, most_bytes)`, which yields a `Log`, and makes its `FORMAT` here.
+# A format's file has a function of a path and of the most bytes, which yields a `Log`, and makes its `FORMAT` of it.
 
 _PATIENCE_S = 20.0  # for one question; some libraries never end
 INSTALL = "pip install 'emaviz[rigs]'"
@@ -484,8 +484,12 @@ def check_lengths(path: str, columns: Mapping[str, Array]) -> None:
             raise refusal(path, f"column {shown(name)!r} has {found}; one length is expected, cut or resample it")
 
 
-def log_format(module: str, title: str, *suffixes: str, needs: str = "", doubtful: tuple[str, ...] = ()) -> Format:
-    """A format whose file is `module`; `needs` is the library that reads it, if it is not always installed."""
+Opening: TypeAlias = Callable[[str, int], AbstractContextManager[Log]]  # path, most bytes; NoLog for what is none
+
+
+def log_format(opened: Opening, title: str, *suffixes: str, needs: str = "", doubtful: tuple[str, ...] = ()) -> Format:
+    """A format that a function of a module opens; `needs` is the library for it, if it is not always installed."""
+    place = f"{opened.__module__}:{opened.__name__}"
 
     def ask(function: str, path: str, max_bytes: int, *more: Any) -> sandbox.Answer:
         if needs and importlib.util.find_spec(needs) is None:
@@ -495,7 +499,7 @@ def log_format(module: str, title: str, *suffixes: str, needs: str = "", doubtfu
         question = f"{__name__}:{function}"
         try:
             return sandbox.ask(
-                question, module, path, max_bytes, *more, most_bytes=3 * max_bytes, patience_s=_PATIENCE_S
+                question, place, title, path, max_bytes, *more, most_bytes=3 * max_bytes, patience_s=_PATIENCE_S
             )
         except sandbox.Broken as error:
             raise refusal(path, f"is not a whole {title} file ({error}); save it again, or in parts") from None
@@ -518,22 +522,22 @@ def log_format(module: str, title: str, *suffixes: str, needs: str = "", doubtfu
 _last: tuple[object, Log, ExitStack] | None = None  # the file that is looked at: it is asked about more than once
 
 
-def names_of(module: str, path: str, max_bytes: int) -> tuple[list[str], list[Array]]:
-    """The columns' names; asked in the process of its own."""
-    return list(offered(path, _opened(module, path, max_bytes))), []
+def names_of(place: str, title: str, path: str, max_bytes: int) -> tuple[list[str], list[Array]]:
+    """The columns' names; asked in the process of its own.  place: "module:function" that opens the file."""
+    return list(offered(path, _opened(place, title, path, max_bytes))), []
 
 
 def columns_of(
-    module: str, path: str, max_bytes: int, names: Sequence[str], strict: bool
+    place: str, title: str, path: str, max_bytes: int, names: Sequence[str], strict: bool
 ) -> tuple[tuple[list[str], list[str], str, tuple[dict[str, str], str, str] | None], list[Array]]:
     """Names, notes, title and what `Clocks` takes, and the columns; asked in the process of its own."""
-    log = _opened(module, path, max_bytes)
+    log = _opened(place, title, path, max_bytes)
     notes = list(log.notes)
     if log.parameters:
         notes.append(f"single numbers in the file: {told(log.parameters)}")
     if log.left_aside:
         notes.append(f"left aside, as they are no columns of numbers: {listed(log.left_aside)}")
-    with _told(module, path):
+    with _told(title, path):
         arrays, done, clocks = taken(path, log, names, max_bytes, strict)
     if strict:
         _close()
@@ -541,27 +545,27 @@ def columns_of(
     return (list(arrays), notes + done, log.title, parts), list(arrays.values())
 
 
-def _opened(module: str, path: str, max_bytes: int) -> Log:
+def _opened(place: str, title: str, path: str, max_bytes: int) -> Log:
     global _last
     status = os.stat(path)
-    key = (module, os.path.realpath(path), status.st_mtime_ns, status.st_size, status.st_ino, max_bytes)
+    key = (place, os.path.realpath(path), status.st_mtime_ns, status.st_size, status.st_ino, max_bytes)
     if _last is not None and _last[0] == key:
         return _last[1]
     _close()
     files = ExitStack()
-    with _told(module, path):
-        log = files.enter_context(importlib.import_module(module).opened(path, max_bytes))
+    with _told(title, path):
+        module, _, function = place.partition(":")
+        log = files.enter_context(getattr(importlib.import_module(module), function)(path, max_bytes))
         log = with_own_clocks(with_runs(log))
     _last = key, log, files
     return log
 
 
 @contextmanager
-def _told(module: str, path: str) -> Iterator[None]:
+def _told(title: str, path: str) -> Iterator[None]:
     try:
         yield
     except NoLog as error:
-        title = importlib.import_module(module).FORMAT.title
         raise refusal(path, f"is not a whole {title} file ({shown(error, 120)}); save it again") from None
 
 

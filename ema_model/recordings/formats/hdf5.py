@@ -218,4 +218,4 @@ def _texts(value: Any) -> list[str]:
     return [part.strip() for part in text.split(",")] if "," in text else []
 
 
-FORMAT = log_format(__name__, "HDF5", ".h5", ".hdf5", ".hdf", ".he5", needs="h5py")
+FORMAT = log_format(opened, "HDF5", ".h5", ".hdf5", ".hdf", ".he5", needs="h5py")

@@ -247,7 +247,7 @@ def _number(value: float) -> float:
         return float("inf")
 
 
-FORMAT = log_format(__name__, "JSON", ".json", ".jsonl", ".ndjson", doubtful=(".json",))
+FORMAT = log_format(opened, "JSON", ".json", ".jsonl", ".ndjson", doubtful=(".json",))
 
 
 # --- the logs of servos on a pendulum by Rhoban/bam (github.com/Rhoban/bam, bam/xl330/record.py …) --------------------

@@ -1,4 +1,4 @@
-"""NumPy's files."""
+"""NumPy's files: an archive of arrays (.npz), and one array (.npy)."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ import math
 import warnings
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -20,8 +21,13 @@ from ema_model.recordings.column_names import is_time
 from ema_model.recordings.formats.channels import (
     Channel,
     Log,
+    Matrix,
+    NoLog,
+    broken_file,
     check_lengths,
     column_names_of,
+    in_columns,
+    log_format,
     offered,
     taken,
     times_of,
@@ -292,4 +298,41 @@ def _not_whole(path: str, error: Exception) -> InputError:
     return refusal(path, f"is not a whole .npz file ({shown(error, 80)}); save it again")
 
 
-FORMAT = Format(".npz", "NumPy", _header, _read, _write)
+NPZ = Format(".npz", "NumPy", _header, _read, _write)
+
+
+# --- one array: a structured one gives a column per field, a matrix its columns ---------------------------------------
+
+
+@contextmanager
+def opened(path: str, most_bytes: int) -> Iterator[Log]:
+    """The array's columns; NoLog for what is none."""
+    del most_bytes  # a map of the file is no larger than the file
+    with broken_file():  # the header is a Python expression, which fails in any way
+        array = np.load(path, mmap_mode="r", allow_pickle=False)
+    if not isinstance(array, np.memmap):
+        raise NoLog("it is no array of numbers")
+    yield Log(_channels(path, array))
+
+
+def _channels(path: str, array: Any) -> list[Channel]:
+    if array.dtype.names:
+        rows = array.reshape(-1)
+        kinds = {name: array.dtype[name] for name in array.dtype.names}
+        return [
+            Channel((name,), rows.size, lambda name=name: np.array(rows[name]))
+            for name, kind in kinds.items()
+            if kind.kind in "fiub" and not kind.shape
+        ]
+    if array.dtype.kind not in "fiub":
+        raise refusal(path, f"holds {shown(array.dtype)}; numbers are expected, store it as double")
+    size = without_ones(array.shape)
+    if len(size) == 2 and (columns := in_columns([Matrix(("data",), size, lambda: array.reshape(size))])[0]):
+        return [replace(one, values=lambda one=one: np.array(one.values())) for one in columns]
+    shape = "×".join(map(str, array.shape)) or "a single value"
+    raise refusal(path, f"is {shape}; a structured array, or a matrix with a column for each signal is expected")
+
+
+NPY = log_format(opened, "NumPy array", ".npy")
+
+FORMAT = NPZ, NPY

@@ -1,15 +1,23 @@
-"""Recordings of emaviz itself and of others for the Rerun viewer: the numbers of each entity on its timeline."""
+"""Formats of recordings that rerun reads, which the science must not know: its own, and MCAP.
+
+They join the family of `ema_model.recordings.formats` when this is imported, as the command line and the session do,
+and do their work in the process that reads logs, so that rerun is loaded there alone.
+"""
 
 from __future__ import annotations
 
+import os
+import struct
+import zlib
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
-from typing import Any
+from typing import Any, BinaryIO
 
 import numpy as np
 import pyarrow as pa
 import pyarrow.compute
 
+from ema_model.recordings.formats import add_format
 from ema_model.recordings.formats.channels import Channel, Log, NoLog, broken_file, log_format
 from ema_model.recordings.formats.json import decoded, numbers_of_records
 
@@ -129,7 +137,7 @@ _TIMELINES = ("sim_time", "sensor_time", "time", "timestamp", "log_time")
 
 
 @contextmanager
-def opened(path: str, most_bytes: int) -> Iterator[Log]:
+def opened_rrd(path: str, most_bytes: int) -> Iterator[Log]:
     """The numbers of all entities; NoLog for what rerun cannot read."""
 
     with broken_file():
@@ -151,4 +159,89 @@ def _decoded(path: str) -> Iterator[Any]:
         raise NoLog("its contents cannot be decoded") from None
 
 
-FORMAT = log_format(__name__, "Rerun", ".rrd", doubtful=(".rrd",))
+# --- whether an MCAP file's chunks unpack to what they declare, by the specification (mcap.dev/spec) ------------------
+# Rerun's reader never ends on some chunks that do not; so each is unpacked here first, and its checksum compared.
+
+_MAGIC = b"\x89MCAP0\r\n"
+_CHUNK, _DATA_END, _FOOTER = 6, 15, 2
+_CODECS = {"": None, "zstd": "zstd", "lz4": "lz4"}
+
+
+def check(file: BinaryIO, most_bytes: int) -> None:
+    """Raises NoLog for records that run beyond the file, chunks that do not unpack, and more than `most_bytes`."""
+    length = file.seek(0, os.SEEK_END)
+    file.seek(0)
+    if file.read(len(_MAGIC)) != _MAGIC:
+        raise NoLog("it does not begin as one")
+    unpacked = 0
+    while file.tell() < length - len(_MAGIC):
+        head = file.read(9)
+        if len(head) < 9:
+            raise NoLog("it is cut short")
+        kind, size = struct.unpack("<BQ", head)
+        if size > length - file.tell():
+            raise NoLog("it is cut short")
+        if kind == _FOOTER:
+            return
+        if kind != _CHUNK:
+            file.seek(size, os.SEEK_CUR)
+            continue
+        unpacked += _check_chunk(file.read(size), most_bytes - unpacked)
+    raise NoLog("it has no footer")
+
+
+def _check_chunk(record: bytes, most_bytes: int) -> int:
+    """Bytes that a chunk unpacks to."""
+    try:
+        size, checksum, name_length = struct.unpack_from("<QII", record, 16)
+        name = record[32 : 32 + name_length].decode("ascii")
+        (packed_size,) = struct.unpack_from("<Q", record, 32 + name_length)
+        packed = record[40 + name_length :]
+    except (struct.error, UnicodeDecodeError):
+        raise NoLog("a chunk has no head") from None
+    if name not in _CODECS or packed_size != len(packed):
+        raise NoLog("a chunk is packed in an unknown way")
+    if size > most_bytes:
+        raise NoLog("it unpacks to more than a measurement may take")
+    codec = _CODECS[name]
+    try:
+        records = pa.decompress(packed, size, codec=codec) if codec else pa.py_buffer(packed)
+    except (OSError, ValueError, pa.ArrowException):
+        raise NoLog("a chunk does not unpack") from None
+    if records.size != size or (checksum and zlib.crc32(records) != checksum):
+        raise NoLog("a chunk unpacks to something else than it declares")
+    at = 0
+    while not checksum and at < size:  # its records are to be looked at one by one
+        at += 9 + int.from_bytes(memoryview(records)[at + 1 : at + 9], "little")
+        if at > size:
+            raise NoLog("a message is cut short")
+    return size
+
+
+# --- MCAP of ROS 2 and Foxglove: topics whose messages are CDR, Protobuf or JSON, each with its stamps ----------------
+
+# A message's own stamp goes before the time at which it was logged.
+_MCAP_TIMELINES = ("ros2_timestamp", "timestamp", "message_publish_time", "message_log_time")
+_JSON = "json"
+
+
+@contextmanager
+def opened_mcap(path: str, most_bytes: int) -> Iterator[Log]:
+    """The numbers of all topics; NoLog for what rerun cannot read."""
+    from rerun.chunk import McapReader
+
+    with open(path, "rb") as file:
+        check(file, most_bytes)
+    with broken_file():
+        info = McapReader(path).info()
+        chunks = Chunks(_MCAP_TIMELINES, most_bytes)
+        decoders = [one for one in McapReader.available_decoders() if one not in ("raw", "schema", "stats", "urdf")]
+        if any(channel.message_encoding == _JSON for channel in info.channels):
+            decoders.append("raw")
+        chunks.take(McapReader(path, decoders=decoders).stream())
+        log = chunks.log()
+    yield log
+
+
+add_format(log_format(opened_mcap, "MCAP", ".mcap"))
+add_format(log_format(opened_rrd, "Rerun", ".rrd", doubtful=(".rrd",)))

@@ -32,7 +32,7 @@ from ema_model.quantities import (
 )
 from ema_model.recordings import Measurement
 from ema_model.recordings.health import Health
-from ema_model.recordings.noise import least_noise
+from ema_model.recordings.signals import least_noise
 from ema_model.result import NULL, Result, as_named
 from ema_model.text import Document, Lines, Note, Table
 

@@ -21,7 +21,7 @@ from ema_model.comparison.explain import Order, orders, pitches
 from ema_model.models.measured_motion import motion_of
 from ema_model.quantities import amount, number, of_signal
 from ema_model.recordings import Measurement
-from ema_model.recordings.noise import sample_noise
+from ema_model.recordings.signals import sample_noise
 
 Array = NDArray[np.float64]
 

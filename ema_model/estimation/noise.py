@@ -16,7 +16,7 @@ from ema_model.actuator import Actuator
 from ema_model.models import Model, Window
 from ema_model.models.model import Signals
 from ema_model.quantities import HALF_90, SIGNALS
-from ema_model.recordings.noise import SCATTER, white_noise
+from ema_model.recordings.signals import SCATTER, white_noise
 
 # --- how well a floor is known: between which multiples of it the error of a true model lies --------------------------
 

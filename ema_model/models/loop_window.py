@@ -15,8 +15,8 @@ from ema_model.errors import InputError, quoted
 from ema_model.models.model import Window
 from ema_model.recordings import SIGNALS, Measurement
 from ema_model.recordings.column_mapping import MOST_DUTY
-from ema_model.recordings.noise import beating, held, is_of_grid
 from ema_model.recordings.read import WITHOUT_COMMAND
+from ema_model.recordings.signals import beating, held, is_of_grid
 from ema_model.remembered import remembered
 from ema_model.simulation.pack import integral_at_start
 from ema_model.simulation.run import steps_per_sample

@@ -16,7 +16,7 @@ from ema_model.models.loop_window import BLOCK_S, CONTEXT
 from ema_model.models.model import Window
 from ema_model.recordings import Measurement
 from ema_model.recordings.measurement import ALONG_A_MAP
-from ema_model.recordings.noise import NEAR, WITHIN, sample_noise, scatter_of
+from ema_model.recordings.signals import NEAR, WITHIN, sample_noise, scatter_of
 from ema_model.simulation.run import FASTEST_HZ, SLOWEST_HZ, steps_per_sample
 
 # --- signals a little later than they are, by Taylor's series about each sample ---------------------------------------

@@ -13,10 +13,10 @@ from numpy.typing import NDArray
 from ema_model.actuator import Actuator
 from ema_model.files.opened import listed, shown
 from ema_model.quantities import SIGNALS, amount, in_sentence
-from ema_model.recordings import noise as estimates
+from ema_model.recordings import signals as estimates
 from ema_model.recordings.column_mapping import MappedColumn
 from ema_model.recordings.measurement import PHASES, Measurement
-from ema_model.recordings.noise import clock_drift, speed_lag
+from ema_model.recordings.signals import clock_drift, speed_lag
 from ema_model.result import NULL, Result
 from ema_model.text import Document, Lines
 

@@ -18,8 +18,8 @@ from ema_model.files.opened import listed, refusal, shown
 from ema_model.quantities import MOTOR, SIGNALS, USER, Axes, check_number, check_seed, number
 from ema_model.recordings.column_mapping import ColumnMapping, Reading
 from ema_model.recordings.formats.format import GAP, between
-from ema_model.recordings.noise import rotation_order
 from ema_model.recordings.side_file import SideFile
+from ema_model.recordings.signals import rotation_order
 from ema_model.text import Document, InWords, Lines, Table
 
 # --- a measurement in words: its size, how its file was read, and its signals with their ranges -----------------------

@@ -11,7 +11,7 @@ import plotly.graph_objects as go
 from numpy.typing import NDArray
 
 from ema_model.errors import InputError
-from ema_model.recordings import window
+from ema_model.recordings import signals
 from emaviz.colours import DIFFERENCE
 from emaviz.figures import theme
 from emaviz.figures.theme import envelope, line, plain
@@ -156,7 +156,7 @@ def drawn(one: Lines, window_s: Window | None = None) -> go.Figure:
 def spectrum(one: Lines, window_s: Window | None) -> go.Figure:
     """Amplitude against frequency of each line in a window, s; None: of all.  InputError: it is too short."""
     chart = theme.new(f"Spectrum: {one.title}{_said(window_s)}", "Frequency [Hz]", f"Amplitude [{one.unit}]")
-    found = [(each, *window.spectrum(each.time_s, each.values)) for each in of_window(one, window_s).lines]
+    found = [(each, *signals.spectrum(each.time_s, each.values)) for each in of_window(one, window_s).lines]
     most = max((float(np.max(amplitude)) for _, _, amplitude in found), default=0.0)
     if most <= 0.0:
         raise InputError("nothing changes in this window; choose another")

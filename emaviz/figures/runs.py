@@ -18,7 +18,7 @@ from ema_model.faults import FAULTS
 from ema_model.identification.run import algorithm_title
 from ema_model.quantities import MOTOR, ROTARY, USER, Axes, Side, of_signal
 from ema_model.recordings import SIGNALS, Measurement
-from ema_model.recordings.window import event
+from ema_model.recordings.signals import event
 from ema_model.text import COLOURS
 from emaviz.colours import CASES, COMMAND, DIFFERENCE, GHOST, MONITOR, PHASES, REFERENCE, RUNS
 from emaviz.figures import theme

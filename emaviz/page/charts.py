@@ -17,7 +17,7 @@ import viser
 from numpy.typing import NDArray
 
 from ema_model.errors import InputError
-from ema_model.recordings.window import event, reading
+from ema_model.recordings.signals import event, reading
 from emaviz.figures.lines import Lines, Window, difference, spectrum
 from emaviz.figures.runs import LEAST_SPACE_PX
 from emaviz.page.window_layout import LEFT_PX, TWO_COLUMNS_PX

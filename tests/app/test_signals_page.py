@@ -12,7 +12,7 @@ import pytest
 from support.comparison_by_hand import comparison as by_hand
 from support.on_page import choose, wait_until, wait_until_at_rest
 
-from ema_model.recordings.window import reading
+from ema_model.recordings.signals import reading
 from emaviz.figures import lines, runs
 from emaviz.figures.lines import Lines, clipped
 from emaviz.page.charts import Measuring

@@ -10,7 +10,7 @@ from support.clicks import Clicks
 from support.comparison_by_hand import comparison as by_hand
 from support.on_page import wait_until, wait_until_at_rest
 
-from ema_model.recordings.window import reading
+from ema_model.recordings.signals import reading
 from emaviz.page.compare import CompareTab
 from emaviz.page.discover import DiscoverTab
 

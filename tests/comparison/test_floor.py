@@ -20,7 +20,7 @@ from ema_model.estimation import Floor, after_fit, calibrate, floor
 from ema_model.estimation.noise import spread, twin_error
 from ema_model.models import ClosedLoop
 from ema_model.recordings.measurement import Sensors
-from ema_model.recordings.noise import held
+from ema_model.recordings.signals import held
 from ema_model.simulation.run import Run, simulate_reference
 
 ACTUATOR = load_actuator()

@@ -9,9 +9,9 @@ from support.representative import first_of
 from ema_model.errors import InputError
 from ema_model.recordings import Measurement, parse_mapping, read_side_file, side_path, write_side_file
 from ema_model.recordings.health import health
-from ema_model.recordings.noise import clock_drift, speed_lag
 from ema_model.recordings.read import read_measurement
 from ema_model.recordings.side_file import SideFile
+from ema_model.recordings.signals import clock_drift, speed_lag
 
 PERIOD, N = 1e-3, 3000
 POSITION, SPEED = "motor_position_rad", "motor_speed_rad_s"

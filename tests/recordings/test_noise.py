@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from ema_model.recordings.noise import beating, held, is_of_grid, sample_noise, white_noise
+from ema_model.recordings.signals import beating, held, is_of_grid, sample_noise, white_noise
 
 STEP = 1e-3
 

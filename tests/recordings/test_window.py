@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from ema_model.errors import InputError
-from ema_model.recordings.window import event, reading, spectrum
+from ema_model.recordings.signals import event, reading, spectrum
 
 TIME = np.linspace(0.0, 1.0, 2001)
 

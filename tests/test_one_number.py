@@ -23,7 +23,7 @@ from support.shown import bands, in_floors, named, plain, unstated, unsure
 from ema_model.actuator import Actuator, load_actuator
 from ema_model.actuator.actuator import between
 from ema_model.comparison.compare import compare
-from ema_model.comparison.error_in_floors import OverFloor
+from ema_model.comparison.residuals import OverFloor
 from ema_model.comparison.result import (
     Comparison,
     SignalError,

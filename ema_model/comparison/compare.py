@@ -11,10 +11,9 @@ from numpy.typing import ArrayLike, NDArray
 from ema_model.actuator import Actuator, load_actuator
 from ema_model.actuator.file import check_represents
 from ema_model.actuator.parameters import path_inside
-from ema_model.comparison.error_in_floors import UNKNOWN, OverFloor, by_signal, is_counted
 from ema_model.comparison.free_simulation import Simulated, in_open_loop, is_by_motion, scored
 from ema_model.comparison.loop_lag import other_controller
-from ema_model.comparison.residuals import residuals_of
+from ema_model.comparison.residuals import UNKNOWN, OverFloor, by_signal, is_counted, residuals_of
 from ema_model.comparison.result import Compared, Comparison, SignalError
 from ema_model.comparison.verdict import judge, judged, silence
 from ema_model.effects import find

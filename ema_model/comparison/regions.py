@@ -13,9 +13,8 @@ from msgspec import Meta
 from numpy.typing import NDArray
 
 from ema_model.actuator import Actuator
-from ema_model.comparison.error_in_floors import ratio
 from ema_model.comparison.explain import Explanation, modulator_of, quantile_knots, used_blocks, without_spikes
-from ema_model.comparison.residuals import Residuals, event_sentence, range_text, region_sentence
+from ema_model.comparison.residuals import Residuals, event_sentence, range_text, ratio, region_sentence
 from ema_model.comparison.thresholds import (
     BAND,
     EVENT_AT_ONCE,

@@ -13,11 +13,10 @@ from numpy.typing import NDArray
 
 from ema_model.actuator import Actuator
 from ema_model.actuator.parameters import on_axes
-from ema_model.comparison.error_in_floors import UNKNOWN, OverFloor
 from ema_model.comparison.explain import Explanation, Order
 from ema_model.comparison.free_simulation import FreeError, Score, Simulated, errors_in_units, without
 from ema_model.comparison.regions import Event, Region
-from ema_model.comparison.residuals import Residuals, dependence
+from ema_model.comparison.residuals import UNKNOWN, OverFloor, Residuals, dependence
 from ema_model.estimation.calibrate import Calibration, KnownTogether, calibration_table, combinations, together
 from ema_model.quantities import (
     ROTARY,

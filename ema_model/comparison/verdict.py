@@ -10,10 +10,17 @@ from numpy.typing import NDArray
 
 from ema_model.actuator import Actuator
 from ema_model.actuator.parameters import on_axes
-from ema_model.comparison.error_in_floors import OverFloor, is_counted, ratio
 from ema_model.comparison.explain import Explanation, Order, explain, residual_orders, used_blocks
 from ema_model.comparison.regions import Event, Region, events, worst_regions
-from ema_model.comparison.residuals import OPEN_LOOP, Residuals, dependence, order_sentence
+from ema_model.comparison.residuals import (
+    OPEN_LOOP,
+    OverFloor,
+    Residuals,
+    dependence,
+    is_counted,
+    order_sentence,
+    ratio,
+)
 from ema_model.comparison.result import Compared, SignalError
 from ema_model.comparison.thresholds import BEYOND, SLOW
 from ema_model.estimation import Calibration

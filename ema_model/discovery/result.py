@@ -13,11 +13,11 @@ from numpy.typing import NDArray
 
 from ema_model.actuator import Actuator
 from ema_model.actuator.parameters import on_axes
-from ema_model.comparison.error_in_floors import OverFloor
 from ema_model.comparison.explain import Explanation
 from ema_model.comparison.free_simulation import FreeError, Simulated, errors_in_units
 from ema_model.comparison.loop_lag import LoopLag
 from ema_model.comparison.regions import Event
+from ema_model.comparison.residuals import OverFloor
 from ema_model.discovery.loop import ControllerSeen, Repeated
 from ema_model.discovery.thresholds import FAR
 from ema_model.discovery.transmission import TransmissionSeen, TwoMasses

@@ -11,10 +11,9 @@ from scipy.ndimage import uniform_filter1d
 
 from ema_model.actuator import Actuator, load_actuator
 from ema_model.commands import command
-from ema_model.comparison.error_in_floors import OverFloor
 from ema_model.comparison.explain import Explanation, Order
 from ema_model.comparison.regions import Region
-from ema_model.comparison.residuals import Residuals, join
+from ema_model.comparison.residuals import OverFloor, Residuals, join
 from ema_model.comparison.result import Compared, Comparison, SignalError
 from ema_model.estimation.calibrate import Calibrated, Calibration
 from ema_model.quantities import unit_of

@@ -241,7 +241,7 @@ from __future__ import annotations
 
 import viser
 
-from emaviz.page.analysis import AnalysisTab
+from emaviz.page.analysis_tab import AnalysisTab
 from emaviz.page.workspaces import Workspace
 
 WORKSPACE = Workspace("levels", "Levels", viser.Icon.RULER, 98)

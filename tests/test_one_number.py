@@ -54,7 +54,7 @@ from emaviz.figures.identification import fault_bars
 from emaviz.page import discover_candidate
 from emaviz.page.compare_result import headline, motion_of, numbers
 from emaviz.page.discover_result import answer
-from emaviz.text.results import MEANINGS, of_comparison, of_discovery, sure_words
+from emaviz.text.verdicts import MEANINGS, of_comparison, of_discovery, sure_words
 from emaviz.views.export import export
 
 FAILING, SLIGHT = 0.006, 0.00035  # N·m of cogging: far beyond noise; so little that a model passes outside its band

@@ -35,7 +35,7 @@ from emaviz.server.viser_private import Inside
 from emaviz.session.campaigns import Campaigns
 from emaviz.session.compare import Comparing
 from emaviz.session.data_folder import DataFolder
-from emaviz.session.discovering import Discovering
+from emaviz.session.discover import Discovering
 from emaviz.session.explore import Session
 from emaviz.session.jobs import Worker, report
 

@@ -31,7 +31,7 @@ from emaviz.server.uploads import Uploads
 from emaviz.server.viser_private import id_of
 from emaviz.session.compare import COMPARABLE, LAY_OUT, MAP, OPEN, Comparing
 from emaviz.session.data_folder import ACTUATOR_SUFFIX
-from emaviz.session.discovering import Discovering
+from emaviz.session.discover import Discovering
 from emaviz.session.files import UPLOADED, Description, Opened, Question
 from emaviz.session.session_file import Part
 from emaviz.session.settings import taken

@@ -35,7 +35,7 @@ from emaviz.scene.playback import Motion, motion
 from emaviz.server.viser_private import selector_of
 from emaviz.session.files import Opened
 from emaviz.text.html import Html, add_html, begin, explained, html, joined, note, unescaped
-from emaviz.text.results import folded, large, of_comparison, shown, warned
+from emaviz.text.verdicts import folded, large, of_comparison, shown, warned
 
 WORKSPACE = Workspace("compare", "Compare", viser.Icon.ARROWS_DIFF, 3)
 

@@ -31,7 +31,7 @@ from emaviz.recording.viewer import ViewerHost
 from emaviz.server.uploads import Uploads
 from emaviz.server.viser_private import id_of
 from emaviz.session.data_folder import CHALLENGE_SUFFIX
-from emaviz.session.discovering import Discovering
+from emaviz.session.discover import Discovering
 from emaviz.session.discovery_source import COMPARED
 from emaviz.session.session_file import Part
 from emaviz.text.html import DIM, Html, add_html, boxed, html, note, said

@@ -32,7 +32,7 @@ from emaviz.page.style import unseen
 from emaviz.page.window_layout import NEXT_COLUMN
 from emaviz.page.workspaces import Page
 from emaviz.server.viser_private import id_of
-from emaviz.session.discovering import Discovering, Preview, Typed, typed
+from emaviz.session.discover import Discovering, Preview, Typed, typed
 from emaviz.session.settings import number as setting_number
 from emaviz.text.html import BOX, WAITS, Html, add_html, boxed, explained, html, joined, mathml, note, unescaped
 

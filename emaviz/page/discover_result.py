@@ -41,10 +41,10 @@ from emaviz.page.window_layout import ALL_COLUMNS, PLOTS_EARLY
 from emaviz.page.workspaces import Page, Workspace
 from emaviz.scene.playback import motion
 from emaviz.session import discovery_source
-from emaviz.session.discovering import Discovering
-from emaviz.session.discovery_history import Entry
+from emaviz.session.discover import Discovering
+from emaviz.session.discovery_entries import Entry
 from emaviz.text.html import BOX, Html, add_html, begin, boxed, explained, html, joined, note, waiting
-from emaviz.text.results import folded, large, of_discovery, shown, warned
+from emaviz.text.verdicts import folded, large, of_discovery, shown, warned
 
 WORKSPACE = Workspace("discover", "Discover", viser.Icon.BULB, 4, lower=True)
 

@@ -17,7 +17,7 @@ from emaviz.page.workspaces import Page, Workspace
 from emaviz.session.fleet import TYPE, ComparingUnits
 from emaviz.session.session_file import Part
 from emaviz.text.html import BOX, DIM, Html, add_html, begin, html, joined, note, waiting
-from emaviz.text.results import MEANINGS, begun, of_units, warned, whole
+from emaviz.text.verdicts import MEANINGS, begun, of_units, warned, whole
 from emaviz.views import fleet
 
 # --- what stays of compared units: the report, and the type as an actuator's file -------------------------------------

@@ -7,7 +7,7 @@ from typing import ClassVar
 import viser
 
 from ema_model.analyses.frequency import sweep
-from emaviz.page.analysis import AnalysisTab
+from emaviz.page.analysis_tab import AnalysisTab
 from emaviz.page.workspaces import Workspace
 from emaviz.text.html import Html
 

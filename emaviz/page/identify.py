@@ -42,13 +42,13 @@ from emaviz.page.workspaces import Page, Workspace
 from emaviz.recording.viewer import ViewerHost
 from emaviz.scene.playback import PLAYED, motion
 from emaviz.session.compare import Comparing
-from emaviz.session.discovering import Discovering
+from emaviz.session.discover import Discovering
 from emaviz.session.identify import Frame, Race, Track, ends
 from emaviz.session.jobs import Worker
 from emaviz.session.session_file import Part, ResultFiles
 from emaviz.session.settings import SLIDERS, Settings, limits, taken
 from emaviz.text.html import Html, add_html, begin, explained, html, joined, note, waiting
-from emaviz.text.results import sure_words
+from emaviz.text.verdicts import sure_words
 
 WORKSPACE = Workspace("identify", "Identify", viser.Icon.SEARCH, 2)
 

@@ -23,7 +23,7 @@ from emaviz.session.jobs import AtWork, Ended, Job, Signal, Waiting, Worker
 from emaviz.session.session_file import Provenance, ResultFiles
 from emaviz.text import going_on
 from emaviz.text.html import BOX, Html, add_html, boxed, html, joined
-from emaviz.text.results import begun, large, warned
+from emaviz.text.verdicts import begun, large, warned
 
 # --- links to the Rerun viewer: a tab of its own is as light or dark as the page is when they are pressed -------------
 

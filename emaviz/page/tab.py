@@ -23,7 +23,7 @@ from emaviz.server.uploads import Uploads
 from emaviz.server.viser_private import id_of
 from emaviz.session.campaigns import Campaigns
 from emaviz.session.compare import Comparing
-from emaviz.session.discovering import Discovering
+from emaviz.session.discover import Discovering
 from emaviz.session.jobs import Worker
 from emaviz.session.session_file import Part, Provenance, results_part
 from emaviz.text.html import Html, HtmlPiece, add_html, html, joined, unescaped

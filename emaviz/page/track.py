@@ -42,7 +42,7 @@ from emaviz.session.jobs import Worker
 from emaviz.session.session_file import Part
 from emaviz.session.track import Following
 from emaviz.text.html import BOX, DIM, Html, add_html, begin, boxed, html, joined, note, waiting
-from emaviz.text.results import warned, whole
+from emaviz.text.verdicts import warned, whole
 from emaviz.views import tracking
 from emaviz.views.tracking import CLICKED
 

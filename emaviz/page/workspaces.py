@@ -21,7 +21,7 @@ from emaviz.server.viser_private import Inside, id_of
 from emaviz.session.explore import Session
 from emaviz.session.jobs import Job, Signal, Waiting, Worker
 from emaviz.text.html import add_html
-from emaviz.text.results import begun, within
+from emaviz.text.verdicts import begun, within
 
 # --- presses of buttons that nobody sees, by which a page tells the server of itself ----------------------------------
 

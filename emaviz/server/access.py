@@ -28,7 +28,7 @@ from websockets.exceptions import ConnectionClosed
 from ema_model.errors import InputError
 from ema_model.files.opened import shown
 from emaviz.server.viser_private import Inside, id_of
-from emaviz.text.results import begun
+from emaviz.text.verdicts import begun
 
 # --- an error beside its field: a line below the control, in the page, until the control is changed again -------------
 

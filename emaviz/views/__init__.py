@@ -18,7 +18,7 @@ from ema_model.errors import InputError
 from ema_model.members import members
 from ema_model.text import Block, InWords
 from emaviz.text.html import Html
-from emaviz.text.results import Meaning
+from emaviz.text.verdicts import Meaning
 
 if TYPE_CHECKING:
     import plotly.graph_objects as go

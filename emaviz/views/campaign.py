@@ -18,7 +18,7 @@ from ema_model.discovery.result import effect_title
 from ema_model.effects import CATALOGUE
 from ema_model.quantities import ROTARY, amount, explanation_title, in_sentence
 from emaviz.figures import campaign
-from emaviz.text.results import Meaning
+from emaviz.text.verdicts import Meaning
 from emaviz.views import Columns, Line, Piece, Row, Section, View
 
 _LEAST = 3  # identifications of a group whose spread is drawn

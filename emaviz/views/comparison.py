@@ -31,7 +31,7 @@ from ema_model.recordings.health import MARKS
 from ema_model.text import Lines, Note, Table
 from emaviz.figures import campaign, comparison
 from emaviz.recording.entry import RecordingError, configured
-from emaviz.text.results import of_comparison
+from emaviz.text.verdicts import of_comparison
 from emaviz.views import Bullets, Group, Line, Links, Piece, Row, Section, Verdict, View
 
 if TYPE_CHECKING:

@@ -23,7 +23,7 @@ from ema_model.text import Table
 from emaviz import __version__
 from emaviz.figures import discovery
 from emaviz.text.html import html, mathml
-from emaviz.text.results import of_discovery
+from emaviz.text.verdicts import of_discovery
 from emaviz.views import Bullets, Columns, Group, Line, Markup, Piece, Row, Section, Verdict, View
 from emaviz.views.comparison import of_free_simulation
 

@@ -17,7 +17,7 @@ from ema_model.fleet.result import UnitsCompared, headline
 from ema_model.quantities import HALF_90, Quantity, amount, in_sentence, number, of_signal
 from emaviz.colours import LIMIT, REFERENCE
 from emaviz.figures import theme
-from emaviz.text.results import Meaning, of_units
+from emaviz.text.verdicts import Meaning, of_units
 from emaviz.views import ANSWER, Figures, Piece, Section, View
 
 # --- each unit's parameters with their intervals, beside what the type shares -----------------------------------------

@@ -12,7 +12,7 @@ from ema_model.analyses.frequency import FrequencyResponse, Response
 from ema_model.analyses.frequency_words import agrees, channel_title, headline, magnitude_unit
 from ema_model.quantities import HALF_90
 from emaviz.figures import theme
-from emaviz.text.results import Meaning
+from emaviz.text.verdicts import Meaning
 from emaviz.views import ANSWER, Figures, Section, View
 
 Array = NDArray[np.float64]

@@ -19,7 +19,7 @@ from ema_model.quantities import amount, number
 from emaviz import __version__
 from emaviz.figures import identification, theme
 from emaviz.recording.entry import RecordingError
-from emaviz.text.results import Meaning, sure_words
+from emaviz.text.verdicts import Meaning, sure_words
 from emaviz.views import Bullets, Columns, Line, Markup, Piece, Row, Section, View
 
 _MARK = "\x1e"  # before a k that is surely not healthy

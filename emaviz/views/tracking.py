@@ -18,7 +18,7 @@ from ema_model.tracking.track import TRACKED, FaultTrack, History, Tracked, head
 from ema_model.tracking.trends import LEAST_FLIGHTS, Remaining
 from emaviz.colours import CASES, COMMAND, MONITOR, REFERENCE
 from emaviz.figures import theme
-from emaviz.text.results import Meaning
+from emaviz.text.verdicts import Meaning
 from emaviz.views import ANSWER, Figures, Section, View
 
 # --- one k over the flights of a unit, with its band, its jumps, and the fan to its threshold -------------------------

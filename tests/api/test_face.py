@@ -15,7 +15,7 @@ import ema_model as em
 from ema_model.recordings import write_measurement
 from ema_model.text import Document, Facts, Lines, Note, Remark, Remarks, Table
 from emaviz.recording.writer import written
-from emaviz.text.results import shown
+from emaviz.text.verdicts import shown
 
 PROJECT = Path(__file__).parents[2]
 NOTEBOOKS = sorted((PROJECT / "assets" / "notebooks").glob("*.ipynb"))

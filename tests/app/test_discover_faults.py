@@ -21,7 +21,7 @@ from emaviz.page import discover_candidate
 from emaviz.page.discover_candidate import about_fault
 from emaviz.page.discover_result import answer
 from emaviz.session.discovery_source import agrees, document_of
-from emaviz.text.results import MEANINGS
+from emaviz.text.verdicts import MEANINGS
 
 pytestmark = pytest.mark.long
 

@@ -23,7 +23,7 @@ from emaviz.page.discover import STEPS, step
 from emaviz.page.discover_result import _SHOWN, as_csv, run_of
 from emaviz.recording.read import read
 from emaviz.scene.playback import motion
-from emaviz.session.discovery_history import KEPT, WHOLE, Entries
+from emaviz.session.discovery_entries import KEPT, WHOLE, Entries
 from emaviz.session.discovery_source import agrees, document_of
 
 EASY = "first_bench_run"

@@ -20,7 +20,7 @@ from emaviz.page import discover_candidate
 from emaviz.page.discover_result import answer
 from emaviz.session import session_file
 from emaviz.session.data_folder import DataFolder
-from emaviz.session.discovery_history import StoredStory, Telling
+from emaviz.session.discovery_entries import StoredStory, Telling
 from emaviz.session.discovery_source import Recipe, agrees, document_of, sensors_of, truth_of
 from emaviz.session.session_file import Part
 from emaviz.session.settings import Settings

@@ -22,7 +22,7 @@ from emaviz.session import session_file
 from emaviz.session.campaigns import Campaigns
 from emaviz.session.compare import Comparing
 from emaviz.session.data_folder import DataFolder
-from emaviz.session.discovering import Discovering
+from emaviz.session.discover import Discovering
 from emaviz.session.explore import Session
 from emaviz.session.fleet import ComparingUnits
 from emaviz.session.jobs import Job, Worker

@@ -15,7 +15,7 @@ from ema_model.identification.search import Landscape, Way, extent, slices, ways
 from ema_model.identification.uncertainty import Suggestion
 from ema_model.simulation.run import run_in_words
 from emaviz.figures import identification
-from emaviz.text.results import sure_words
+from emaviz.text.verdicts import sure_words
 
 TRUTH = vector({"k1": 0.3, "k6": 0.4})
 

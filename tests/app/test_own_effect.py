@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from ema_model.effects.user.expression import FUNCTIONS, MOST_CHARACTERS, VARIABLES
 from ema_model.effects.user.torque import kernels
-from emaviz.session.discovering import typed
+from emaviz.session.discover import typed
 
 GOOD = ["-c*sign(omega)*sqrt(abs(omega))", "A*sin(14*theta) + B*cos(14*theta)", "clamp(k*user, -0.1, 0.1)", "a*t**2"]
 EVIL = [

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from emaviz.text.results import begun, warned
+from emaviz.text.verdicts import begun, warned
 
 
 @pytest.mark.parametrize(

@@ -21,7 +21,7 @@ from emaviz.session.data_folder import DataFolder
 from emaviz.session.explore import Session, Simulation
 from emaviz.session.identify import ends
 from emaviz.session.session_file import results_part
-from emaviz.text.results import sure_words
+from emaviz.text.verdicts import sure_words
 
 
 @pytest.fixture

@@ -12,7 +12,7 @@ from support.discovered import with_cogging
 
 from emaviz.page.compare_result import headline
 from emaviz.page.discover_result import answer
-from emaviz.text.results import MEANINGS, of_discovery, of_units
+from emaviz.text.verdicts import MEANINGS, of_discovery, of_units
 from emaviz.views import discovery
 from emaviz.views.comparison import VIEW
 from emaviz.views.export import Figures, markup

@@ -6,7 +6,7 @@ from ema_model.actuator import load_actuator
 from emaviz.session import session_file
 from emaviz.session.compare import Comparing
 from emaviz.session.data_folder import DataFolder
-from emaviz.session.discovering import Discovering
+from emaviz.session.discover import Discovering
 from emaviz.session.explore import Session
 from emaviz.session.session_file import Part
 from support.on_page import wait_until

@@ -27,7 +27,7 @@ from emaviz.recording.viewer import ViewerHost
 from emaviz.session.analysis import Analysing
 from emaviz.session.session_file import Part
 from emaviz.text.html import BOX, add_html, begin, html, note, waiting
-from emaviz.text.results import large, whole
+from emaviz.text.verdicts import large, whole
 from emaviz.views import ANSWER, Figures, Section, View, Words, view_for
 
 _CONFIG = {"displayModeBar": False}

@@ -1,4 +1,4 @@
-"""Sentences of results that page and reports share."""
+"""What verdicts mean, by their colours, and the sentences of results that page and reports share."""
 
 from __future__ import annotations
 

@@ -32,7 +32,7 @@ from ema_model.files.written import whole_file
 from ema_model.quantities import in_sentence
 from emaviz.session.compare import Comparing
 from emaviz.session.data_folder import DataFolder
-from emaviz.session.discovery_history import Entries, Entry, Shown, Telling, undecided
+from emaviz.session.discovery_entries import Entries, Entry, Shown, Telling, undecided
 from emaviz.session.discovery_source import NOTHING, DiscoverySource, Sealing
 from emaviz.session.explore import Session
 from emaviz.session.jobs import Job, Signal, Tell, Worker, aside

@@ -55,7 +55,7 @@ from emaviz.page import discover_candidate
 from emaviz.page.compare_result import headline, motion_of, numbers
 from emaviz.page.discover_result import answer
 from emaviz.text.verdicts import MEANINGS, of_comparison, of_discovery, sure_words
-from emaviz.views.export import export
+from emaviz.views.report import export
 
 FAILING, SLIGHT = 0.006, 0.00035  # N·m of cogging: far beyond noise; so little that a model passes outside its band
 CANDIDATES = ("cogging_torque", "constant_load", "stribeck_friction")

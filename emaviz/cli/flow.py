@@ -303,7 +303,7 @@ def of_result(result: Result, actuator: Actuator | None = None) -> Answer:
     """
 
     def write(path: str, configuration: Mapping[str, Any]) -> None:
-        from emaviz.views.export import export
+        from emaviz.views.report import export
 
         export(result, path, configuration)
 

@@ -129,7 +129,7 @@ class Analysing:
         path = folder.fresh(folder.recordings, self.analysis.name, suffix)
 
         def keep() -> None:
-            from emaviz.views.export import export  # plotly takes half a second to import
+            from emaviz.views.report import export  # plotly takes half a second to import
 
             export(found, path)
             self.events.kept(path)

@@ -352,7 +352,7 @@ def _identified(task: Task, it: TaskInputs, path: Path, tell: Tell) -> None:
 
 
 def _compared(task: Task, it: TaskInputs, path: Path, tell: Tell) -> None:
-    from emaviz.views.export import export
+    from emaviz.views.report import export
 
     own = msgspec.convert(task.settings, KINDS["compare"].settings)
     found = compare(it.fitted, it.actuator, calibrate=own.calibrate, holdout=it.held, on_progress=tell)
@@ -360,7 +360,7 @@ def _compared(task: Task, it: TaskInputs, path: Path, tell: Tell) -> None:
 
 
 def _discovered(task: Task, it: TaskInputs, path: Path, tell: Tell) -> None:
-    from emaviz.views.export import export
+    from emaviz.views.report import export
 
     own = msgspec.convert(task.settings, KINDS["discover"].settings)
     signals = ["current_A"] if own.signals == "current" else None

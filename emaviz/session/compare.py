@@ -582,7 +582,7 @@ class Comparing:
     def _save(self, suffix: str) -> None:
         if self.comparison is None:
             raise InputError("nothing is compared yet; press Compare first")
-        from emaviz.views.export import export  # rerun and the report's figures take half a second of the app's start
+        from emaviz.views.report import export  # rerun and the report's figures take half a second of the app's start
 
         path = self.folder.fresh(self.folder.recordings, "compare", suffix)
         export(self.comparison, path)

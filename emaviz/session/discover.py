@@ -135,7 +135,7 @@ def keep(look: Look, folder: DataFolder, suffix: str) -> Path:
     if suffix == ".toml":
         save_actuator(found.actuator, path)
     else:
-        from emaviz.views.export import export  # rerun and the report's figures take half a second of the app's start
+        from emaviz.views.report import export  # rerun and the report's figures take half a second of the app's start
 
         export(found, path, configuration)
     return path

@@ -217,7 +217,7 @@ class ComparingUnits:
 
     def _keep(self, found: UnitsCompared, suffix: str) -> None:
         if suffix == REPORT:
-            from emaviz.views.export import export  # plotly takes half a second to import
+            from emaviz.views.report import export  # plotly takes half a second to import
 
             path = self.folder.fresh(self.folder.recordings, "units", suffix)
             export(found, path)

@@ -446,7 +446,7 @@ class Identifying:
                 raise InputError("the recording of this identification could not be written, or is not here any more")
             return race.path
         from emaviz.recording.entry import free_name
-        from emaviz.views.export import export  # plotly takes a second to import
+        from emaviz.views.report import export  # plotly takes a second to import
 
         path = free_name(self._folder, f"{datetime.now():%Y%m%d-%H%M%S}-identify", ".html")
         export(race.best.answer, path, readable(race.settings))

@@ -450,7 +450,7 @@ class Following:
         path = self.folder.fresh(self.folder.recordings, "track", suffix)
 
         def keep() -> None:
-            from emaviz.views.export import export  # plotly takes half a second to import
+            from emaviz.views.report import export  # plotly takes half a second to import
 
             export(replace(found, actuator=self.session.actuator.name), path)
             self.events.kept(path)

@@ -15,7 +15,7 @@ from ema_model.quantities import VARIABLES, Axes
 from ema_model.simulation.run import EffectRuns
 from emaviz.figures.discovery import effect_residual_legend, pictures
 from emaviz.text.html import mathml
-from emaviz.views.export import escape, paragraph, table
+from emaviz.views.report import escape, paragraph, table
 
 _STYLE = (
     ":root{color-scheme:light dark}"

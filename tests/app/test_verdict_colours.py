@@ -15,7 +15,7 @@ from emaviz.page.discover_result import answer
 from emaviz.text.verdicts import MEANINGS, of_discovery, of_units
 from emaviz.views import discovery
 from emaviz.views.comparison import VIEW
-from emaviz.views.export import Figures, markup
+from emaviz.views.report import Figures, markup
 
 GREEN = MEANINGS["good"]
 

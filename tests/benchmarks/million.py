@@ -19,7 +19,7 @@ from ema_model.recordings import Measurement, write_measurement
 from ema_model.recordings import read as read_recording
 from ema_model.recordings.measurement import Sensors
 from ema_model.simulation.run import Run, simulate_reference
-from emaviz.views.export import export
+from emaviz.views.report import export
 
 KEPT = ("time_s", "command_rad", "user_position_rad", "motor_position_rad", "motor_speed_rad_s", "current_A")
 

@@ -23,7 +23,7 @@ from ema_model.discovery.words import (
 )
 from ema_model.estimation import Calibrated
 from ema_model.quantities import ROTARY, Axes, in_sentence
-from emaviz.views.export import export
+from emaviz.views.report import export
 
 RAW = re.compile(r"[a-z]+\.[a-z_]+_|cogging_torque|torque_ripple|_Nm|_A\b")
 

@@ -13,7 +13,7 @@ from support.comparison_by_hand import comparison as by_hand
 from ema_model.errors import InputError
 from emaviz.recording import read
 from emaviz.recording.blueprint import Contents, build
-from emaviz.views.export import export
+from emaviz.views.report import export
 
 
 @pytest.fixture(scope="module")

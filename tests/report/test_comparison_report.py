@@ -20,7 +20,7 @@ from ema_model.recordings.health import Finding, Health
 from emaviz.page.compare_result import numbers
 from emaviz.recording.writer import written
 from emaviz.views.comparison import VIEW
-from emaviz.views.export import Figures, export, markup
+from emaviz.views.report import Figures, export, markup
 
 HOSTILE = '</script><script>window.bad = 1</script><img src="x" onerror="window.bad = 2">&amp;'
 

@@ -18,7 +18,7 @@ from ema_model.errors import InputError
 from ema_model.quantities import number
 from emaviz.figures import discovery
 from emaviz.text.html import mathml
-from emaviz.views.export import export
+from emaviz.views.report import export
 
 HOSTILE = '</script><script>window.bad = 1</script><img src="x" onerror="window.bad = 2">&amp;'
 

@@ -1,4 +1,4 @@
-"""Metaheuristic optimisers, one a file: a new module here with an `Optimiser` subclass is found by itself."""
+"""Metaheuristic optimisers: an `Optimiser` subclass in a module of this folder is found by itself."""
 
 from __future__ import annotations
 

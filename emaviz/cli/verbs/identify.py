@@ -7,7 +7,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 from ema_model.errors import InputError
-from ema_model.members import stated_by_class, stated_in
+from ema_model.members import stated, stated_in
 from emaviz.cli import options
 from emaviz.cli.ending import PartialAnswer
 from emaviz.cli.options import whole
@@ -28,7 +28,7 @@ PLACE = 3
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """The options of INTERFACES, and those of the run that is simulated when no file is given."""
     robust = stated_in("ema_model.identification.run", "ROBUST")
-    algorithms = (robust, *stated_by_class("ema_model.identification.optimisers", "name").values())
+    algorithms = (robust, *stated("ema_model.identification.optimisers", "name").values())
     fitnesses = stated_in("ema_model.simulation.plant", "FITNESSES")
     options.add_recordings(parser, "fitted", nargs="*")
     parser.add_argument(

@@ -100,7 +100,7 @@ FORMAT = Format(".rows", "JSON rows", _header, _read)
 
 from __future__ import annotations
 
-from ema_model.identification.optimisers.metaheuristics import SparrowSearch
+from ema_model.identification.optimisers.sparrow_search import SparrowSearch
 
 
 class Lottery(SparrowSearch):

@@ -11,7 +11,9 @@ import numpy as np
 import pytest
 
 from ema_model.identification.optimisers import OPTIMISERS, Optimiser, create
-from ema_model.identification.optimisers.metaheuristics import Dandelion, HoneyBadger, SparrowSearch
+from ema_model.identification.optimisers.dandelion import Dandelion
+from ema_model.identification.optimisers.honey_badger import HoneyBadger
+from ema_model.identification.optimisers.sparrow_search import SparrowSearch
 
 D = 8
 TARGET = np.array([0.3, 0.62, 0.45, 0.7, 0.25, 0.8, 0.55, 0.37])

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from ema_model.identification.optimisers.metaheuristics import Optimiser
+from ema_model.identification.optimisers.base import Optimiser
 from ema_model.members import classes
 
 OPTIMISERS: dict[str, type[Optimiser]] = {one.name: one for one in classes(__name__, Optimiser)}

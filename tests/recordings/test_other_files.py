@@ -11,7 +11,7 @@ from support.foreign_files import mat73, tdms
 
 from ema_model.errors import InputError
 from ema_model.recordings import read_columns
-from ema_model.recordings.formats import loggers
+from ema_model.recordings.formats import mdf
 from ema_model.recordings.read import read_measurement
 
 N = 120
@@ -135,6 +135,6 @@ def test_an_attachment_of_an_mdf_file_is_not_read(tmp_path, monkeypatch):
     with MDF(path):
         assert read == [other]  # or the file would show nothing
     read.clear()
-    with loggers.opened_mdf(str(path), 10_000_000) as log:
+    with mdf.opened(str(path), 10_000_000) as log:
         assert next(channel.path[-1] for channel in log.channels) == "current"
     assert not read

@@ -27,7 +27,7 @@ from ema_model.actuator import Actuator
 from ema_model.commands import command as command_of
 from ema_model.comparison import Comparison
 from ema_model.discovery import Discovery
-from ema_model.discovery.begin import with_fitted_effects
+from ema_model.discovery.history import with_fitted_effects
 from ema_model.effects import find
 from ema_model.errors import InputError, did_you_mean, quoted
 from ema_model.exports import export as exporting

@@ -34,7 +34,7 @@ from ema_model.comparison.result import (
     verdict,
 )
 from ema_model.discovery import Discovery, discover, result_of, words
-from ema_model.discovery.begin import begun
+from ema_model.discovery.history import begun
 from ema_model.discovery.result import Change, errors_of
 from ema_model.discovery.snapshot import Look, assessed, look_at
 from ema_model.estimation.calibrate import calibration_table, combination_in_words

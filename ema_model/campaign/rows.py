@@ -87,7 +87,7 @@ def prepare() -> None:
     os.environ["EMAVIZ_COMPILE_AHEAD"] = "0"
     import numba
 
-    from ema_model.simulation.compiled import always_library
+    from ema_model.simulation.pack import always_library
 
     numba.set_num_threads(1)  # of this thread; where numba was there before
     always_library()

@@ -32,7 +32,7 @@ from ema_model.recordings.health import health_of
 from ema_model.recordings.read import check_same_actuator, prepared
 from ema_model.recordings.recording_set import check_held_out
 from ema_model.recordings.side_file import stated
-from ema_model.simulation.compiled import compile_behind
+from ema_model.simulation.pack import compile_behind
 
 Array = NDArray[np.float64]
 Progress = Callable[[str], None]

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from ema_model.discovery.begin import begun
 from ema_model.discovery.discover import discover, result_of, settings_of
-from ema_model.discovery.history import Story
+from ema_model.discovery.history import Story, begun
 from ema_model.discovery.remaining import Verified, verified
 from ema_model.discovery.result import Added, Candidate, Discovery, Experiment, Rung
 

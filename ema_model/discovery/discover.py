@@ -8,8 +8,7 @@ from dataclasses import replace
 from ema_model.actuator import Actuator, load_actuator
 from ema_model.comparison.explain import Explanation
 from ema_model.comparison.result import Comparison
-from ema_model.discovery.begin import begun
-from ema_model.discovery.history import ShownFit, Story, refreshed
+from ema_model.discovery.history import ShownFit, Story, begun, refreshed
 from ema_model.discovery.inverse import other_loop, support_of
 from ema_model.discovery.loop import repeated
 from ema_model.discovery.next_experiment import next_experiment

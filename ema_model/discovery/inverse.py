@@ -13,8 +13,7 @@ from ema_model.actuator import Actuator, Tolerance
 from ema_model.actuator.parameters import INVERSE_PLACES
 from ema_model.comparison.loop_lag import LoopLag
 from ema_model.comparison.thresholds import BAND, MISSED
-from ema_model.discovery.begin import calibrated_story
-from ema_model.discovery.history import Story
+from ema_model.discovery.history import Story, calibrated_story
 from ema_model.discovery.loop import ControllerSeen, by_inverse_dynamics, controller_seen
 from ema_model.discovery.remaining import at_floor, ratio
 from ema_model.discovery.result import Added, Candidate, Change

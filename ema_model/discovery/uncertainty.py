@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from ema_model.estimation import Calibration
 from ema_model.estimation.calibrate import calibrated, problem_of
-from ema_model.estimation.information import by_pieces, posterior
+from ema_model.estimation.least_squares import by_pieces, posterior
 from ema_model.estimation.model_fit import Data, Fit, fit
 from ema_model.models import Model
 from ema_model.quantities import HALF_90

@@ -13,8 +13,15 @@ from numpy.typing import ArrayLike, NDArray
 
 from ema_model.actuator import Actuator
 from ema_model.actuator.parameters import on_axes
-from ema_model.estimation.information import Combination, by_pieces, covariance_of, known_together, measured, posterior
-from ema_model.estimation.least_squares import descended
+from ema_model.estimation.least_squares import (
+    Combination,
+    by_pieces,
+    covariance_of,
+    descended,
+    known_together,
+    measured,
+    posterior,
+)
 from ema_model.estimation.noise import CORRELATED_S, DRAWS, Floor, local_rms
 from ema_model.estimation.problem import (
     ECCENTRICITY,

@@ -16,8 +16,7 @@ from ema_model.errors import InputError, quoted
 from ema_model.exports.program import Program, field_name, program_of
 from ema_model.physics.rows import LANES, PARAMETER_ROWS, STATE_ROWS
 from ema_model.quantities import MOTOR, USER, Axes, Side
-from ema_model.simulation.compiled import own_stack
-from ema_model.simulation.pack import monitor_rows
+from ema_model.simulation.pack import monitor_rows, own_stack
 from ema_model.stacks import Stack
 
 Array = NDArray[np.float64]

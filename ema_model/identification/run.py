@@ -26,7 +26,7 @@ from ema_model.identification.uncertainty import Uncertainty, uncertainty
 from ema_model.physics.rows import LANES
 from ema_model.quantities import amount, as_number, check_seed, in_sentence
 from ema_model.result import FLAT, NAME, NULL, Result
-from ema_model.simulation.compiled import compile_ahead, compile_here, stack_at_hand, wait_for
+from ema_model.simulation.pack import compile_ahead, compile_here, stack_at_hand, wait_for
 from ema_model.simulation.run import run_in_words
 from ema_model.stacks import Stack
 from ema_model.text import Document, Lines, Remark, Remarks, Table

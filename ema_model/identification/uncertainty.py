@@ -17,7 +17,7 @@ from ema_model.actuator.parameters import on_axes
 from ema_model.commands import command
 from ema_model.errors import InputError
 from ema_model.estimation.calibrate import driven_to_bound
-from ema_model.estimation.information import Combination, known_together
+from ema_model.estimation.least_squares import Combination, known_together
 from ema_model.estimation.noise import CORRELATED_S, Floor, repeats_of, silent
 from ema_model.estimation.problem import ECCENTRICITY, K_SIGMA, Problem, polar, to_vector
 from ema_model.identification.fit import FAULTS, TWINS, Fitted

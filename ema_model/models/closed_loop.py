@@ -26,8 +26,7 @@ from ema_model.models.model import Effects, ModelParts, Signals
 from ema_model.physics.rows import LANES
 from ema_model.recordings import Measurement
 from ema_model.recordings.signals import least_noise, sample_noise
-from ema_model.simulation.compiled import own_stack, stack_at_hand
-from ema_model.simulation.pack import initial_state, monitor_rows
+from ema_model.simulation.pack import initial_state, monitor_rows, own_stack, stack_at_hand
 from ema_model.simulation.plant import simulate_references
 from ema_model.simulation.run import Run, reference_steps, traced
 from ema_model.stacks import Stack

@@ -22,8 +22,7 @@ from ema_model.models.model import Effects, ModelParts, Signals
 from ema_model.physics.rows import LANES
 from ema_model.recordings import Measurement
 from ema_model.recordings.signals import least_noise
-from ema_model.simulation.compiled import stack_at_hand
-from ema_model.simulation.pack import monitor_rows
+from ema_model.simulation.pack import monitor_rows, stack_at_hand
 from ema_model.simulation.run import needed_currents
 from ema_model.stacks import Stack
 

@@ -24,11 +24,14 @@ from ema_model.recordings.column_names import (
     USER,
     Guess,
     Name,
+    UnitOfMeasure,
+    dimensions_of,
+    find_unit,
     known_export,
+    known_units,
     readings,
 )
 from ema_model.recordings.formats.format import Clocks
-from ema_model.recordings.units import UnitOfMeasure, dimensions_of, find_unit, known_units
 
 # --- which column of a file is which signal, in which unit and with which sign; its text form and its use -------------
 

@@ -14,9 +14,16 @@ from ema_model.actuator.parameters import WITHOUT_LOOP
 from ema_model.commands import Command
 from ema_model.errors import InputError, quoted
 from ema_model.recordings import Measurement
-from ema_model.simulation import compiled
-from ema_model.simulation.compiled import library_stack, own_stack, stack_at_hand, wait_for
-from ema_model.simulation.pack import EffectSettings, initial_reference_state, reference_rows
+from ema_model.simulation import pack
+from ema_model.simulation.pack import (
+    EffectSettings,
+    initial_reference_state,
+    library_stack,
+    own_stack,
+    reference_rows,
+    stack_at_hand,
+    wait_for,
+)
 from ema_model.simulation.run import (
     NOTHING,
     REFERENCE_SUBSTEPS,
@@ -114,18 +121,18 @@ def note(actuator: Actuator) -> str:
 def is_compiled(actuator: Actuator, effects: Mapping[str, Any]) -> bool:
     """Whether the next simulation with these effects begins at once."""
     kernel = _kernel(actuator)
-    return compiled.is_compiled(stack_at_hand(actuator, effects, "reduced", kernel), kernel)
+    return pack.is_compiled(stack_at_hand(actuator, effects, "reduced", kernel), kernel)
 
 
 def compile_own(actuator: Actuator) -> None:
     """Compiles what every simulation without hidden effects takes, of an actuator that has effects in its file too."""
-    compiled.compile_here(own_stack(actuator), _kernel(actuator))
+    pack.compile_here(own_stack(actuator), _kernel(actuator))
 
 
 def compile_behind(actuator: Actuator) -> None:
     """Begins to compile what the first hidden effect and the first discovery need, in another process."""
     library = library_stack(actuator)
-    compiled.compile_ahead([(library, _kernel(actuator)), (library, "traces")], urgent=False)
+    pack.compile_ahead([(library, _kernel(actuator)), (library, "traces")], urgent=False)
 
 
 def simulate(

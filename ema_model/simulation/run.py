@@ -19,8 +19,15 @@ from ema_model.physics.rows import LANES
 from ema_model.quantities import ROTARY, USER, Axes, check_number, in_sentence, parameter_title, unit_of
 from ema_model.recordings import Measurement
 from ema_model.side_by_side import blocks
-from ema_model.simulation.compiled import is_compiled, stack_at_hand, wait_for
-from ema_model.simulation.pack import initial_reference_state, initial_state, monitor_rows, reference_rows
+from ema_model.simulation.pack import (
+    initial_reference_state,
+    initial_state,
+    is_compiled,
+    monitor_rows,
+    reference_rows,
+    stack_at_hand,
+    wait_for,
+)
 from ema_model.stacks import Stack
 
 # --- how the load on the user shaft goes over time: constant, a step, a sine or a chirp (the thesis's load block) -----

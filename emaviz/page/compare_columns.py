@@ -16,9 +16,9 @@ import viser
 from ema_model.errors import InputError, quoted
 from ema_model.recordings import SIGNALS, ColumnMapping, MappedColumn
 from ema_model.recordings.column_mapping import WITHOUT_DELAY, unit_in_name
+from ema_model.recordings.column_names import known_units
 from ema_model.recordings.formats.text_layout import ENCODINGS, Hints
 from ema_model.recordings.health import Finding, Health
-from ema_model.recordings.units import known_units
 from ema_model.text import COLOURS
 from emaviz.page.style import IN_PAIRS, unseen_field
 from emaviz.page.window_layout import TWO_COLUMNS_PX

@@ -13,7 +13,7 @@ from support.one_tab import Tab
 
 from ema_model.identification import search
 from ema_model.models import closed_loop, inverse_dynamics
-from ema_model.simulation import compiled
+from ema_model.simulation import pack
 from emaviz.page.app import App
 from emaviz.session import compare
 from emaviz.session.jobs import Worker
@@ -99,7 +99,7 @@ def computed(monkeypatch: pytest.MonkeyPatch) -> list[str]:
     for name in ("needed_currents", "stack_at_hand"):
         watch(inverse_dynamics, name)
     watch(search, "exclusive")
-    watch(compiled, "find_stack")
+    watch(pack, "find_stack")
     return calls
 
 

@@ -11,8 +11,8 @@ from support.on_page import wait_until
 from ema_model.actuator import load_actuator
 from ema_model.errors import InputError
 from ema_model.faults import HEALTHY, vector
-from ema_model.simulation import compiled, plant
-from ema_model.simulation.compiled import library_stack, own_stack, stack_at_hand
+from ema_model.simulation import pack, plant
+from ema_model.simulation.pack import library_stack, own_stack, stack_at_hand
 from ema_model.simulation.run import Run, simulate_monitor, simulate_reference
 from emaviz.page.app import App
 from emaviz.page.explore import ExploreTab
@@ -117,7 +117,7 @@ def replace_first(k, value):
 @pytest.mark.parametrize(("name", "kernel"), [(None, "run"), pytest.param(SERVO, "traces", marks=pytest.mark.long)])
 def test_a_start_compiles_the_plants_own_kernels_and_behind_them_the_librarys(tmp_path, monkeypatch, name, kernel):
     asked = []
-    monkeypatch.setattr(compiled, "compile_ahead", lambda kernels, urgent=True: asked.append((list(kernels), urgent)))
+    monkeypatch.setattr(pack, "compile_ahead", lambda kernels, urgent=True: asked.append((list(kernels), urgent)))
     ours = load_actuator() if name is None else actuator(name)
     session = Session(ours, tmp_path)
     session.start()

@@ -9,7 +9,7 @@ import pytest
 
 from ema_model import kernel_cache
 from ema_model.campaign.rows import ENVIRONMENT
-from ema_model.simulation import compiled
+from ema_model.simulation import pack
 
 
 @pytest.fixture(autouse=True)
@@ -20,7 +20,7 @@ def _as_before(monkeypatch):
         if not os.environ[name]:
             monkeypatch.delenv(name)
     monkeypatch.setattr(kernel_cache, "turns", kernel_cache.turns)
-    monkeypatch.setattr(compiled, "_only_library", compiled._only_library)
+    monkeypatch.setattr(pack, "_only_library", pack._only_library)
     threads = numba.get_num_threads()
     yield
     numba.set_num_threads(threads)

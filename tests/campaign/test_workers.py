@@ -15,7 +15,7 @@ from ema_model.campaign import load_plan, store
 from ema_model.campaign.rows import OtherVersion, Turns, row_of
 from ema_model.campaign.run import Processes
 from ema_model.campaign.store import version
-from ema_model.simulation import compiled
+from ema_model.simulation import pack
 
 IMPORTED = re.compile(r"from ema_model\.campaign\.(\w+) import")
 COMPILES = """
@@ -89,16 +89,16 @@ def test_a_lock_that_stays_is_waited_for_and_then_passed(tmp_path, monkeypatch):
 
 
 def test_what_is_compiled_does_not_choose_the_kernels(monkeypatch):
-    monkeypatch.setattr(compiled, "_only_library", False)  # whatever another test made of this process
-    monkeypatch.setattr(compiled, "is_known", lambda *_: True)
-    monkeypatch.setattr(compiled, "is_compiled", lambda *_: True)
+    monkeypatch.setattr(pack, "_only_library", False)  # whatever another test made of this process
+    monkeypatch.setattr(pack, "is_known", lambda *_: True)
+    monkeypatch.setattr(pack, "is_compiled", lambda *_: True)
     from ema_model.actuator import load_actuator
 
     actuator = load_actuator()
-    assert compiled.stack_at_hand(actuator, ["hinge_moment"], "reduced", "run").effects == ("hinge_moment",)
-    compiled.always_library()
-    assert set(compiled.stack_at_hand(actuator, ["hinge_moment"], "reduced", "run").effects) == set(compiled.LIBRARY)
-    assert compiled.stack_at_hand(actuator, [], "reduced", "run").effects == ()
+    assert pack.stack_at_hand(actuator, ["hinge_moment"], "reduced", "run").effects == ("hinge_moment",)
+    pack.always_library()
+    assert set(pack.stack_at_hand(actuator, ["hinge_moment"], "reduced", "run").effects) == set(pack.LIBRARY)
+    assert pack.stack_at_hand(actuator, [], "reduced", "run").effects == ()
 
 
 def test_a_worker_of_another_version_computes_nothing(tmp_path):

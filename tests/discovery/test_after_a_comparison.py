@@ -9,7 +9,7 @@ import pytest
 from ema_model.actuator import load_actuator
 from ema_model.challenges import challenges, opened
 from ema_model.comparison import compare
-from ema_model.discovery.begin import begun
+from ema_model.discovery.history import begun
 from ema_model.recordings import read
 
 

@@ -11,8 +11,8 @@ from ema_model.actuator import load_actuator
 from ema_model.commands import command
 from ema_model.comparison.thresholds import BAND
 from ema_model.discovery import discover
-from ema_model.discovery.begin import begun
 from ema_model.discovery.discover import result_of
+from ema_model.discovery.history import begun
 from ema_model.discovery.result import Change
 from ema_model.discovery.search import Search
 from ema_model.discovery.terms import noise_of, terms_of

@@ -10,7 +10,7 @@ import pytest
 from ema_model.actuator import load_actuator
 from ema_model.commands import command
 from ema_model.discovery import fingerprints
-from ema_model.discovery.begin import begun
+from ema_model.discovery.history import begun
 from ema_model.discovery.terms import hidden, noise_of, settings_at, terms_of
 from ema_model.effects import find
 from ema_model.recordings.measurement import Sensors

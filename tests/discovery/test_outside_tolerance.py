@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from ema_model.actuator import load_actuator
-from ema_model.discovery.begin import calibrated_story
+from ema_model.discovery.history import calibrated_story
 from ema_model.discovery.uncertainty import outside_tolerance, with_intervals
 from ema_model.recordings import Measurement
 

@@ -8,8 +8,8 @@ import pytest
 
 from ema_model.actuator import load_actuator
 from ema_model.commands import command
-from ema_model.discovery.begin import begun
 from ema_model.discovery.discover import result_of
+from ema_model.discovery.history import begun
 from ema_model.discovery.words import document_of
 from ema_model.faults import vector
 from ema_model.recordings.measurement import Sensors

@@ -12,7 +12,7 @@ from support.hidden_effects import ACTUATOR, recorded
 
 from ema_model.discovery import discover
 from ema_model.discovery import inverse as asked
-from ema_model.discovery.begin import begun, calibrated_story
+from ema_model.discovery.history import begun, calibrated_story
 from ema_model.discovery.inverse import as_logged, second_opinion
 from ema_model.discovery.loop import controller_seen
 from ema_model.discovery.objections import contradictions

@@ -15,7 +15,7 @@ from ema_model.actuator import Actuator
 from ema_model.actuator.file import parse_actuator
 from ema_model.comparison import compare
 from ema_model.comparison.result import Comparison
-from ema_model.estimation.information import known_together
+from ema_model.estimation.least_squares import known_together
 from ema_model.recordings import Measurement
 
 K, R, J = "motor.torque_constant_Nm_A", "motor.resistance_Ohm", "motor.inertia_kgm2"

@@ -17,8 +17,7 @@ from ema_model.identification.search import Objective
 from ema_model.physics.rows import LANES
 from ema_model.recordings import Measurement
 from ema_model.simulation import run as simulation
-from ema_model.simulation.compiled import stack_at_hand
-from ema_model.simulation.pack import initial_state, monitor_rows
+from ema_model.simulation.pack import initial_state, monitor_rows, stack_at_hand
 from ema_model.simulation.plant import simulated
 from ema_model.simulation.run import Run, simulate_monitor, traced
 from ema_model.stacks import CIRCUITS, exclusive, find_stack

@@ -20,9 +20,18 @@ from ema_model.faults import HEALTHY
 from ema_model.identification.search import Objective
 from ema_model.models import ClosedLoop, InverseDynamics
 from ema_model.physics.rows import LANES
-from ema_model.simulation import compiled as compiled_simulation
-from ema_model.simulation.compiled import LIBRARY, is_compiled, library_stack, own_stack, stack_at_hand
-from ema_model.simulation.pack import initial_reference_state, initial_state, monitor_rows, reference_rows
+from ema_model.simulation import pack as compiled_simulation
+from ema_model.simulation.pack import (
+    LIBRARY,
+    initial_reference_state,
+    initial_state,
+    is_compiled,
+    library_stack,
+    monitor_rows,
+    own_stack,
+    reference_rows,
+    stack_at_hand,
+)
 from ema_model.simulation.plant import simulated
 from ema_model.simulation.run import NOTHING, Run
 from ema_model.stacks import Stack
@@ -198,8 +207,8 @@ def test_what_is_compared_goes_in_the_library_and_what_is_searched_has_its_own(m
 TAKEN = """
 import sys
 from ema_model.actuator import load_actuator
-from ema_model.simulation.compiled import library_stack, own_stack, stack_at_hand
-from ema_model.simulation.compiled import compile_ahead, compile_here, is_compiled, wait_for
+from ema_model.simulation.pack import library_stack, own_stack, stack_at_hand
+from ema_model.simulation.pack import compile_ahead, compile_here, is_compiled, wait_for
 actuator, names = load_actuator(), ["winding_resistance"]
 assert stack_at_hand(actuator, names, "reduced", "currents") is library_stack(actuator)
 own = own_stack(actuator, names)

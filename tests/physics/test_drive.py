@@ -25,8 +25,7 @@ from ema_model.effects.sampled_control import speed_sample
 from ema_model.effects.speed_loop_integral import integral_gain
 from ema_model.faults import HEALTHY
 from ema_model.physics.rows import LANES
-from ema_model.simulation.compiled import library_stack
-from ema_model.simulation.pack import initial_state, monitor_rows
+from ema_model.simulation.pack import initial_state, library_stack, monitor_rows
 from ema_model.simulation.run import NOTHING, Run, simulate_monitor
 
 THESIS = load_actuator()

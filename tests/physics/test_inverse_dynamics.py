@@ -13,8 +13,7 @@ from ema_model.models import InverseDynamics
 from ema_model.models.measured_motion import motion_of
 from ema_model.physics.rows import LANES
 from ema_model.recordings import Measurement, SideFile
-from ema_model.simulation.compiled import stack_at_hand, wait_for
-from ema_model.simulation.pack import monitor_rows
+from ema_model.simulation.pack import monitor_rows, stack_at_hand, wait_for
 
 FREE = """
 name = "free motor"

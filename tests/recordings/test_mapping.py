@@ -12,8 +12,8 @@ from hypothesis import strategies as st
 from ema_model.errors import InputError
 from ema_model.recordings import SIGNALS, ColumnMapping, MappedColumn, apply_mapping, guess_mapping, parse_mapping
 from ema_model.recordings.column_mapping import doubt
+from ema_model.recordings.column_names import UNITS, find_unit
 from ema_model.recordings.read import read_measurement
-from ema_model.recordings.units import UNITS, find_unit
 
 # header: the signal of each column in its order, with the unit where it is not the signal's own; - is left aside
 HEADERS = {

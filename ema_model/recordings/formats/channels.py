@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from ema_model.errors import InputError
 from ema_model.files import sandbox
 from ema_model.files.opened import COLUMNS, listed, refusal, shown
-from ema_model.recordings.column_names import QUANTITIES, is_time, readings
+from ema_model.recordings.column_names import QUANTITIES, UnitOfMeasure, dimensions_of, find_unit, is_time, readings
 from ema_model.recordings.formats.format import (
     Clocks,
     Columns,
@@ -32,7 +32,6 @@ from ema_model.recordings.formats.format import (
     rule,
     usable,
 )
-from ema_model.recordings.units import UnitOfMeasure, dimensions_of, find_unit
 
 # --- channels as loggers keep them: each with its unit and, where the format has them, with a clock of its own --------
 

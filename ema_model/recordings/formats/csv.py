@@ -19,7 +19,7 @@ import pyarrow.csv as pc
 from ema_model.errors import InputError, quoted
 from ema_model.files.opened import LINE_BYTES, listed, megabytes, refusal, shown
 from ema_model.quantities import SIGNALS
-from ema_model.recordings.column_names import is_time, readings
+from ema_model.recordings.column_names import find_unit, is_time, readings
 from ema_model.recordings.formats.arrow import as_numpy, mask
 from ema_model.recordings.formats.channels import beside_time, tokens, with_unit
 from ema_model.recordings.formats.format import (
@@ -47,7 +47,6 @@ from ema_model.recordings.formats.text_layout import (
     seconds,
     split,
 )
-from ema_model.recordings.units import find_unit
 
 # --- a text as UTF-8, whatever it is stored in ------------------------------------------------------------------------
 

@@ -16,8 +16,8 @@ import pyarrow.compute
 from numpy.typing import NDArray
 
 from ema_model.files.opened import refusal, shown
+from ema_model.recordings.column_names import dimensions_of
 from ema_model.recordings.formats.arrow import as_numpy
-from ema_model.recordings.units import dimensions_of
 
 # --- date and time as loggers write them, as seconds since the first --------------------------------------------------
 

@@ -68,7 +68,7 @@ def run(arguments: argparse.Namespace) -> int:
 
         model, fixed, free = actuator, effects, arguments.free
         if to_fit:
-            from ema_model.discovery.begin import with_fitted_effects
+            from ema_model.discovery.history import with_fitted_effects
 
             fixed = {name: settings for name, settings in effects.items() if name not in to_fit}
             beside = replace(actuator, effects={**actuator.effects, **fixed})

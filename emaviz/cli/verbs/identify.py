@@ -90,7 +90,7 @@ def _identified(
 ) -> flow.Answer:
     # These take a second: recordings are refused before.
     if to_fit:
-        from ema_model.discovery.begin import with_fitted_effects
+        from ema_model.discovery.history import with_fitted_effects
 
         actuator = with_fitted_effects(fitted, actuator, to_fit, progress.show)
     from ema_model.identification.run import SEARCH_SHARE, IdentifiedSoFar, identify

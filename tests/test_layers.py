@@ -39,7 +39,7 @@ FLOORS = {
         ["evidence", "fingerprints", "refit", "remaining", "uncertainty"],
         ["curve", "next_experiment", "terms", "words"],
         ["history"],
-        ["begin", "objections", "rounds"],
+        ["objections", "rounds"],
         ["inverse"],
         ["search"],
         ["discover", "snapshot"],

@@ -138,8 +138,8 @@ class Worker:
         """
 
         def tell(*values: Values.args, **named: Values.kwargs) -> None:
-            about = None if each is None else each(*values, **named)
-            self.post((kind or tell, about), lambda: act(*values, **named))
+            own = kind or tell
+            self.post(own if each is None else (own, each(*values, **named)), lambda: act(*values, **named))
 
         signal.connect(tell)
 

@@ -64,7 +64,7 @@ class AskedControls:
         self._calibrate = page.bind(calibrate, lambda: comparing.calibrate, self._set_calibrate, at_once=True)
         page.changed_to(self._actuator, self.choose)
         for control in (self._windowed, self._from, self._to):
-            control.on_update(lambda event: event.client and self._set_window())
+            page.changed(control, self._set_window, at_once=True)
 
     def choose(self, name: str) -> None:
         """Takes an actuator, just uploaded; on the screen's thread."""

@@ -381,7 +381,7 @@ class ParameterSliders:
         hint = f"In {unit}. What it does is drawn below; the fit begins here"
         slider = self._page.server.gui.add_slider(name, low, high, _step(low, high), value, hint=hint)
         slider.precision = 7
-        slider.on_update(lambda event: event.client and self._set(name))
+        self._page.changed(slider, partial(self._set, name), at_once=True)
         return slider
 
     def _set(self, name: str) -> None:

@@ -424,10 +424,10 @@ class ExplorePanel:
             )
         settings = page.session.settings
         page.changed(self._preset, self._take_preset)
-        self._command.on_update(lambda event: event.client and self._choose_command())
+        page.changed(self._command, self._choose_command, at_once=True)
         self._listen(duration, partial(settings.set, "duration_s"), lambda: settings.duration_s)
         # Set by the session as well, after which nothing is to be simulated again.
-        self.monitor.on_update(lambda event: event.client and self._take_monitor())
+        page.changed(self.monitor, self._take_monitor, at_once=True)
         page.bind(self._own, lambda: page.session.plant, self._take_plant)
         page.screen.hear(page.session.events.plants, self._plant_taken)
 
@@ -555,7 +555,7 @@ class ExplorePanel:
         slider = self._page.server.gui.add_slider(
             self._label(index), 0.0, 1.0, 0.005, value, hint=f"{fault.name}: {fault.title}, 0 … 1"
         )
-        slider.on_update(lambda event: event.client and self._slide(index))
+        self._page.changed(slider, partial(self._slide, index), at_once=True)
         return slider
 
     def _label(self, index: int) -> str:

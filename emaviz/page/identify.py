@@ -198,7 +198,7 @@ class LandscapeView:
             add_html(gui, NEXT_COLUMN)
         self._words = add_html(gui)
         for entry in (self._x, self._y):
-            entry.on_update(lambda event: event.client and self._chosen())
+            page.changed(entry, self._chosen, at_once=True)
         page.pressed(self._draw, self._begin)
         page.screen.follow(self._landscapes.job, self._busy)
         slow.hear(self._landscapes.grown, self._draw_map, kind="landscape")

@@ -53,7 +53,7 @@ class EffectPage:
         page.measuring.add(self._charts.handles, self._charts.lines, self._charts.zoom)
         page.workspaces.heights.add(self._charts.handles)
         page.workspaces.entered.connect(self._enter)
-        self._run.on_update(lambda event: event.client and self._ask())
+        page.changed(self._run, self._ask, at_once=True)
 
     def _enter(self, workspace: str) -> None:
         """A first visit finds an effect opened."""
@@ -112,7 +112,7 @@ class EffectPage:
             step = float(f"{(high - low) / 400.0:.0e}")
             low, high = min(_inwards(low), middle), max(-_inwards(-high), middle)
             slider = gui.add_slider(one.label, low, high, step, middle, hint=one.meaning)
-        slider.on_update(lambda event: event.client and self._ask())
+        self._page.changed(slider, self._ask, at_once=True)
         return slider
 
     def _ask(self) -> None:

@@ -461,11 +461,7 @@ class RunsPanel:
 
     def _post(self, job: Callable[[], None], control: Any = None) -> None:
         """On the files' thread; what is refused stands beside the control."""
-
-        def checked() -> None:
-            self._page.checked(job, control or self._choice)
-
-        self._files.post(job.__qualname__, checked)
+        self._files.post(job.__qualname__, lambda: self._page.checked(job, control or self._choice))
 
 
 def _card(entry: Entry) -> Html:

@@ -187,7 +187,7 @@ class TrackResult:
         with self._save:
             self._kept = keep()
         page.changed(self._today, self._draw, on=slow)
-        self._fault.on_update(lambda event: event.client and self._choose())
+        page.changed(self._fault, self._choose, at_once=True)
 
     def busy(self, busy: bool) -> None:
         """Whether a run goes on: where no flight is shown yet, it is said that it does."""
@@ -360,7 +360,7 @@ class TrackPanel:
         self._left_out = add_html(gui)
         page.changed(self._fault, self._show_fault)
         for control in (self._ends, self._threshold):
-            control.on_update(lambda event: event.client and self._ask_threshold())
+            page.changed(control, self._ask_threshold, at_once=True)
         page.bind(watch, lambda: following.watching, partial(setattr, following, "watching"))
         page.pressed(self._start, self._begin)
         page.disable(job, self._folder.control, self._fault, self._ends)

@@ -370,16 +370,27 @@ class Page:
 
         button.on_click(pressed)
 
-    def changed(self, control: Any, act: Callable[[], object], on: Worker | None = None) -> None:
-        """Calls act when a person changes a control; not when the program does."""
-        self.changed_to(control, lambda _: act(), on)
+    def changed(
+        self, control: Any, act: Callable[[], object], on: Worker | None = None, *, at_once: bool = False
+    ) -> None:
+        """Calls act when a person changes a control, not when the program does.
 
-    def changed_to(self, control: Any, act: Callable[[Any], object], on: Worker | None = None) -> None:
+        at_once: on the server's thread, without waiting for what is drawn, as for a slider that is dragged.
+        """
+        self.changed_to(control, lambda _: act(), on, at_once=at_once)
+
+    def changed_to(
+        self, control: Any, act: Callable[[Any], object], on: Worker | None = None, *, at_once: bool = False
+    ) -> None:
         """The same with the value that the person gave, even where the program has set another one since."""
 
         def changed(event: viser.GuiEvent[Any]) -> None:
-            if event.client is not None:
-                value = control.value
+            if event.client is None:
+                return
+            value = control.value
+            if at_once:
+                self.checked(lambda: act(value), control)
+            else:
                 (on or self.screen).post(id_of(control), lambda: self.checked(lambda: act(value), control))
 
         control.on_update(changed)
@@ -390,19 +401,18 @@ class Page:
         """A control of what the session holds: get() is that, take(value) what a person chooses or types instead.
 
         Of a value that take refuses, a choice is taken back, while a text or a number stays to be corrected.
-        at_once: take is called by the server's thread, without waiting for what is drawn.
         """
         bound = Bound(control, get)
 
         def change() -> None:
-            if not self.checked(lambda: take(control.value), control) and isinstance(control, _CHOICES):
-                bound.show()
+            try:
+                take(control.value)
+            except InputError:
+                if isinstance(control, _CHOICES):
+                    bound.show()
+                raise
 
-        def changed(event: viser.GuiEvent[Any]) -> None:
-            if event.client is not None:
-                change() if at_once else self.screen.post(id_of(control), change)
-
-        control.on_update(changed)
+        self.changed(control, change, at_once=at_once)
         return bound
 
     def disable(self, job: Job, *controls: Any) -> None:

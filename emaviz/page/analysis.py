@@ -133,7 +133,7 @@ class AnalysisPanel:
         self._start = gui.add_button(analysing.analysis.title, icon=workspace.icon)
         self._line = JobLine(page, job, workspace)
         page.pressed(self._start, self._begin)
-        page.disable(job, self._start, *self._options.values())
+        page.disable_while(job, self._start, *self._options.values())
         standing.connect(self._start, self._forget_errors)
         screen.follow(job, result.busy)
         screen.hear(analysing.events.found, result.show)

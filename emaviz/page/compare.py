@@ -419,7 +419,7 @@ class ComparePanel:
         page.pressed(self.to_fit, self._close_columns)
         page.pressed(self._remove, self._remove_shown)
         page.pressed(self._start, comparing.ask)
-        page.disable(comparing.job, self._start)  # it is asked for already; a press else says what is missing
+        page.disable_while(comparing.job, self._start)  # while it runs it is asked for already
         standing.connect(self._start, self._forget_errors)
         events, hear = comparing.events, page.screen.hear
         hear(events.opened, self._opened, each=lambda opened: opened.name)

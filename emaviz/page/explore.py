@@ -335,7 +335,7 @@ class SealControls:
         )
         JobLine(page, sealing.job, WORKSPACE)
         page.pressed_by(self._button, self._ask)
-        page.disable(sealing.job, self._button)
+        page.disable_while(sealing.job, self._button)
         page.screen.hear(sealing.sealed, self._sealed)
 
     def _ask(self, client: viser.ClientHandle | None) -> None:

@@ -165,7 +165,7 @@ class UnitsPanel:
         self._start = gui.add_button("Compare units", icon=WORKSPACE.icon, disabled=True)
         self._line = JobLine(page, job, WORKSPACE, pauses="it")
         page.pressed(self._start, self._begin)
-        page.disable(job, self._folder.control, rule, actuator)
+        page.disable_while(job, self._folder.control, rule, actuator)
         standing.connect(self._start, self._forget_errors)
         screen.hear(job.began, lambda _: self._practice.fold())
         screen.follow(job, self._busy)

@@ -305,7 +305,7 @@ class RunsPanel:
         page.pressed(self._compare, self._compare_two, on=files)
         page.pressed(self._rename, self._rename_chosen, on=files)
         page.pressed_by(self._delete, self._ask)
-        again.on_click(lambda _: self.refresh_soon())
+        page.pressed(again, self.refresh_soon)
         page.session.identifying.identified.connect(lambda _: self.refresh_soon())
         page.workspaces.entered.connect(lambda name: name == WORKSPACE.name and self.refresh_soon())
         threading.Thread(target=self._watch, name="emaviz-runs", daemon=True).start()

@@ -363,7 +363,7 @@ class TrackPanel:
             page.changed(control, self._ask_threshold, at_once=True)
         page.bind(watch, lambda: following.watching, partial(setattr, following, "watching"))
         page.pressed(self._start, self._begin)
-        page.disable(job, self._folder.control, self._fault, self._ends)
+        page.disable_while(job, self._folder.control, self._fault, self._ends)
         standing.connect(self._start, self._forget_errors)
         screen.hear(job.began, lambda _: self._practice.fold())
         screen.follow(job, self._busy)

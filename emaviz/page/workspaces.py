@@ -415,7 +415,7 @@ class Page:
         self.changed(control, change, at_once=at_once)
         return bound
 
-    def disable(self, job: Job, *controls: Any) -> None:
+    def disable_while(self, job: Job, *controls: Any) -> None:
         """Controls cannot be used while a job runs."""
 
         def show(running: bool) -> None:

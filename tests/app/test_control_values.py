@@ -343,7 +343,7 @@ def test_a_press_is_answered_on_its_thread_with_its_window(server, raw, page, se
 def test_controls_are_disabled_while_a_job_runs(server, page, screen):
     box, go = server.gui.add_checkbox("waits", False), threading.Event()
     job = Job(screen)
-    page.disable(job, box)
+    page.disable_while(job, box)
 
     def work(_):
         while not go.is_set():

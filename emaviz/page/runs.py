@@ -74,7 +74,7 @@ class SessionControls:
                 ),
             )
         page.pressed_by(save, self._save, on=files)
-        page.pressed(self._load, lambda: self._read(comparing.folder.session(str(self._choice.value))))
+        self._load.on_click(lambda _: self._load_named(str(self._choice.value)))  # as it is chosen when it is pressed
         self.refresh()
 
     def refresh(self, newest: bool = True) -> None:
@@ -87,6 +87,9 @@ class SessionControls:
     def uploaded(self, path: Path) -> None:
         """A session came from the browser; on any thread."""
         self._page.ask("load session", lambda: self._read(path), self._load)
+
+    def _load_named(self, name: str) -> None:
+        self._page.ask("load session", lambda: self._read(self._comparing.folder.session(name)), self._load)
 
     def _save(self, client: viser.ClientHandle | None) -> None:
         folder = self._comparing.folder
@@ -300,12 +303,12 @@ class RunsPanel:
         with gui.add_folder("All, newest first"):
             self._list = add_html(gui)
             again = gui.add_button("Refresh the list", icon=viser.Icon.REFRESH, color="gray")
-        page.changed(self._choice, self._take_choice, on=files)
+        page.changed_to(self._choice, self._take_choice, on=files)  # the list may be about to be read again
         page.pressed(self._open, self._open_chosen, on=files)
         page.pressed(self._compare, self._compare_two, on=files)
         page.pressed(self._rename, self._rename_chosen, on=files)
         page.pressed_by(self._delete, self._ask)
-        page.pressed(again, self.refresh_soon)
+        page.pressed(again, partial(page.checked, self.refresh, self._choice), on=files)
         page.session.identifying.identified.connect(lambda _: self.refresh_soon())
         page.workspaces.entered.connect(lambda name: name == WORKSPACE.name and self.refresh_soon())
         threading.Thread(target=self._watch, name="emaviz-runs", daemon=True).start()
@@ -363,8 +366,10 @@ class RunsPanel:
         self._list.content = _listed(entries) + more
         self._show_chosen()
 
-    def _take_choice(self) -> None:
+    def _take_choice(self, name: str) -> None:
         self._by_hand = True
+        if name in self._choice.options:
+            self._choice.value = name
         self._show_chosen()
 
     def _offer_others(self) -> None:

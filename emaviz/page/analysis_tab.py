@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 from typing import Any, ClassVar
 
 import plotly.graph_objects as go
@@ -59,7 +60,17 @@ class AnalysisResult:
         self._drawn: list[Any] = []  # of the answer that is shown
         self._save = gui.add_folder("Keep it", visible=False)
         with self._save:
-            self._keep = AnalysisKeep(page, analysing, viewer)
+            self._keep = KeepButtons(
+                page,
+                analysing.comparing.folder,
+                viewer,
+                analysing.events.kept,
+                lambda suffix, _: analysing.save(suffix),
+                analysing.provenance,
+                REPORT,
+                RECORD,
+                _TABLE,
+            )
 
     def busy(self, busy: bool) -> None:
         """Whether a run goes on: where there is no answer yet, it is said that it does."""
@@ -105,52 +116,28 @@ class AnalysisResult:
         return [gui.add_plotly(one, config=_CONFIG, aspect=aspect) for one in figures]
 
 
-class AnalysisKeep(KeepButtons):
-    """Report, recording and table, and what they have written."""
-
-    def __init__(self, page: Page, analysing: Analysing, viewer: ViewerHost | None) -> None:
-        name = analysing.analysis.name
-
-        def save(suffix: str, button: Any) -> None:
-            page.ask(f"{name} {suffix}", lambda: analysing.save(suffix), button)
-
-        super().__init__(
-            page,
-            name,
-            analysing.comparing.folder,
-            viewer,
-            analysing.events.kept,
-            save,
-            analysing.provenance,
-            REPORT,
-            RECORD,
-            _TABLE,
-        )
-
-
 class AnalysisPanel:
     """The controls on the left: a list for each option, and the run."""
 
     def __init__(self, tab: AnalysisTab, analysing: Analysing, result: AnalysisResult, standing: Standing) -> None:
         page, workspace = tab.page, tab.workspace
         self._page, self._analysing, self._result = page, analysing, result
-        gui, post, name = page.server.gui, page.screen.post, analysing.analysis.name
+        gui, screen, job, events = page.server.gui, page.screen, analysing.job, analysing.comparing.events
         add_html(gui, note(tab.about))
         self._given = add_html(gui)
         self._options: dict[str, Any] = {}
         for option, one in analysing.analysis.options.items():
             control: Any = gui.add_dropdown(one.title, tuple(one.choices.values()), hint=_capital(one.help))
-            control.on_update(lambda event, option=option: event.client and self._ask(option))
+            page.changed_to(control, partial(self._choose, option))
             self._options[option] = control
         self._start = gui.add_button(analysing.analysis.title, icon=workspace.icon)
-        self._line = JobLine(page, analysing.job, workspace)
-        self._start.on_click(lambda _: post(name, self._begin))
+        self._line = JobLine(page, job, workspace)
+        page.pressed(self._start, self._begin)
+        page.disable_while(job, self._start, *self._options.values())
         standing.connect(self._start, self._forget_errors)
-        analysing.job.began.connect(lambda _: post(f"{name} began", lambda: self._busy(True)))
-        analysing.job.ended.connect(lambda _: post(f"{name} ended", lambda: self._busy(False)))
-        analysing.events.found.connect(lambda found: post(f"{name} found", lambda: result.show(found)))
-        for event in (analysing.comparing.events.opened, analysing.comparing.events.removed):
-            event.connect(lambda *_: post(f"{name} given", self.refresh))
+        screen.follow(job, result.busy)
+        screen.hear(analysing.events.found, result.show)
+        screen.hear_any((events.opened, events.removed), self.refresh)
         self.refresh()
 
     def refresh(self) -> None:
@@ -167,12 +154,9 @@ class AnalysisPanel:
         self.refresh()
         self._result.show(self._analysing.result)
 
-    def _ask(self, option: str) -> None:
-        """As it is chosen now."""
-        title, control = str(self._options[option].value), self._options[option]
+    def _choose(self, option: str, title: str) -> None:
         titles = self._analysing.analysis.options[option].choices
-        value = next((value for value, one in titles.items() if one == title), title)
-        self._page.ask(f"{option} of an analysis", lambda: self._analysing.choose(option, value), control)
+        self._analysing.choose(option, next((value for value, one in titles.items() if one == title), title))
 
     def _begin(self) -> None:
         if not self._page.begins(self._analysing.begin, self._start):
@@ -182,12 +166,6 @@ class AnalysisPanel:
         """What was said of recordings that are not chosen any more."""
         self._page.say_beside(self._start, "")
         self._line.forget_refusal()
-
-    def _busy(self, busy: bool) -> None:
-        with self._page.server.atomic():
-            for control in (self._start, *self._options.values()):
-                control.disabled = busy
-            self._result.busy(busy)
 
 
 class AnalysisTab(Tab):

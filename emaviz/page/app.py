@@ -160,7 +160,7 @@ class App:
         if not plant.can_be_explored(actuator):
             self._first.set()  # there will be no picture of a run
         events = self.session.events  # what tabs draw of a run is posted before
-        events.simulated.connect(lambda _: self.screen.post("first picture", lambda: self._drawn(started)))
+        self.screen.hear_any([events.simulated], lambda: self._drawn(started))
         events.told.connect(self.page.notify)
         self.session.start()
         for path in given:

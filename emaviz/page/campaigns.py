@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from functools import partial
 from pathlib import Path
 from typing import Any
 from urllib.parse import quote
@@ -82,16 +83,16 @@ class CampaignControls:
                 for _ in range(_MOST_FIGURES)
             ]
             self._tables = add_html(gui)
-        self._choice.on_update(lambda event: event.client and self._post(self._show))
-        self._group.on_update(lambda event: event.client and self._post(self._show_rows))
-        self._open.on_click(lambda _: self._post(self._open_chosen))
-        again.on_click(lambda _: self._post(self.refresh))
+        page.changed(self._choice, self._show, on=files)
+        page.changed(self._group, partial(self._try, self._show_rows), on=files)
+        page.pressed(self._open, partial(self._try, self._open_chosen), on=files)
+        page.pressed(again, partial(self._try, self.refresh), on=files)
         page.workspaces.entered.connect(self._show_it)
         campaigns.computing.began.connect(lambda _: self._begun())
-        campaigns.grown.connect(lambda name: self._post(lambda: self._grow(name)))
-        campaigns.written.connect(lambda name, _: self._post(lambda: self._grow(name)))
-        campaigns.opened.connect(lambda path, run: self._post(lambda: opened(path, run)))
-        self._post(self.refresh)
+        files.hear(campaigns.grown, partial(self._try, self._grow))
+        files.hear(campaigns.written, lambda name, _: self._try(self._grow, name))
+        files.hear(campaigns.opened, partial(self._try, opened))
+        files.post("campaigns", partial(self._try, self.refresh))
 
     def place(self) -> Place:
         """The campaign that is shown."""
@@ -103,7 +104,7 @@ class CampaignControls:
         self._campaigns.store(name)
         self._choice.options, self._choice.value = self._campaigns.names(), name
         self._page.workspaces.bring_forward(self._at.name, "", _TAB)
-        self._post(self._show)
+        self._files.post("campaign", partial(self._try, self._show))
 
     def saved(self) -> dict[str, Any] | None:
         """The campaign that is shown, for a session's file."""
@@ -196,13 +197,9 @@ class CampaignControls:
     def _say(self, text: str) -> None:
         self._status.content = said(text)
 
-    def _post(self, job: Callable[[], None]) -> None:
-        """On the files' thread; what is refused stands below the list."""
-
-        def checked() -> None:
-            self._page.checked(job, self._choice)
-
-        self._files.post(f"campaign {job.__qualname__}", checked)
+    def _try(self, act: Callable[..., object], *values: Any) -> None:
+        """What is refused stands below the list."""
+        self._page.checked(lambda: act(*values), self._choice)
 
 
 class _Starts:
@@ -222,10 +219,10 @@ class _Starts:
         self._about = add_html(gui)
         self._start = gui.add_button("Compute", icon=viser.Icon.PLAYER_PLAY)
         JobLine(page, campaigns.computing, at)
-        self._plan.on_update(lambda event: event.client and self._take_plan())
+        page.changed(self._plan, self._take_plan)
         for control in (self._name, self._workers):
-            control.on_update(lambda event: event.client and self._tell_soon())
-        self._start.on_click(lambda _: page.screen.post("campaign begins", self._begin))
+            page.changed(control, self._tell_soon)
+        page.pressed(self._start, self._begin)
         self._tell_soon()
 
     @property
@@ -243,10 +240,7 @@ class _Starts:
         self._tell_soon()
 
     def _tell_soon(self) -> None:
-        def tell() -> None:
-            self._page.checked(self._tell, self._name)
-
-        self._files.post("plan", tell)
+        self._files.post("plan", lambda: self._page.checked(self._tell, self._name))
 
     def _tell(self) -> None:
         self._about.content = _box(self._campaigns.about(self._asked))

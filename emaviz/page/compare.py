@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -25,8 +26,7 @@ from emaviz.page.share import Place
 from emaviz.page.style import LONG_LABELS, unseen
 from emaviz.page.tab import COLUMNS, FIT, MISSING, Shared, Standing, Tab
 from emaviz.page.window_layout import COLUMNS as WINDOW_COLUMNS
-from emaviz.page.workspaces import Page
-from emaviz.recording.viewer import ViewerHost
+from emaviz.page.workspaces import Bound, Page
 from emaviz.server.uploads import Uploads
 from emaviz.server.viser_private import id_of
 from emaviz.session.compare import COMPARABLE, LAY_OUT, MAP, OPEN, Comparing
@@ -57,14 +57,14 @@ class AskedControls:
             )
             uploads.add_button("Upload an actuator file", ACTUATOR_SUFFIX, icon=viser.Icon.UPLOAD, color="gray")
             NewActuator(page, comparing, self.choose)
-            self._calibrate = gui.add_checkbox("Calibrate it first", comparing.calibrate)
+            calibrate = gui.add_checkbox("Calibrate it first", comparing.calibrate)
             self._free_folder = gui.add_folder("What the calibration may move", expand_by_default=False)
         self._free: list[Any] = []
         self._list_free()
-        self._actuator.on_update(lambda event: event.client and self._chosen())
-        self._calibrate.on_update(lambda _: self._set_calibrate())
+        self._calibrate = page.bind(calibrate, lambda: comparing.calibrate, self._set_calibrate, at_once=True)
+        page.changed_to(self._actuator, self.choose)
         for control in (self._windowed, self._from, self._to):
-            control.on_update(lambda event: event.client and self._set_window())
+            page.changed(control, self._set_window, at_once=True)
 
     def choose(self, name: str) -> None:
         """Takes an actuator, just uploaded; on the screen's thread."""
@@ -80,10 +80,11 @@ class AskedControls:
     def show_settings(self) -> None:
         """All controls as the session's part has them; on the screen's thread."""
         comparing = self._comparing
-        window = comparing.window_s  # kept, since the controls' own callbacks may set it
-        self._calibrate.value = comparing.calibrate
-        for name, box in self._signals.items():
-            box.value = comparing.weights.get(name, 0.0)
+        window = comparing.window_s
+        self._calibrate.show()
+        self._free_folder.visible = comparing.calibrate
+        for one in self._signals.values():
+            one.show()
         self._windowed.value = window is not None
         self._from.visible = self._to.visible = window is not None
         if window is not None:
@@ -93,29 +94,25 @@ class AskedControls:
     def show_signals(self) -> None:
         """Only the signals that every recording has can be chosen."""
         known = self._comparing.signals_available()
-        for name, box in self._signals.items():
-            box.disabled = name not in known
+        for name, one in self._signals.items():
+            one.control.disabled = name not in known
         if self._comparing.actuator_name != self._actuator.value:
             self.show_actuator()
 
-    def _signal(self, name: str) -> Any:
-        weight = self._comparing.weights.get(name, 0.0)
+    def _signal(self, name: str) -> Bound:
+        comparing = self._comparing
+
+        def weight() -> float:
+            return comparing.weights.get(name, 0.0)
+
         hint = "Weight in the calibration: 1 is what its noise says, 0 leaves it out"
-        box = self._page.server.gui.add_number(SIGNALS[name].title, weight, min=0.0, step=0.1, hint=hint, disabled=True)
+        gui = self._page.server.gui
+        box = gui.add_number(SIGNALS[name].title, weight(), min=0.0, step=0.1, hint=hint, disabled=True)
+        return self._page.bind(box, weight, partial(comparing.set_weight, name), at_once=True)
 
-        def changed(_: Any) -> None:
-            self._page.checked(lambda: self._comparing.set_weight(name, box.value), box)
-
-        box.on_update(changed)
-        return box
-
-    def _chosen(self) -> None:
-        name = str(self._actuator.value)
-        self._page.screen.post("actuator", lambda: self.choose(name))
-
-    def _set_calibrate(self) -> None:
-        self._comparing.calibrate = bool(self._calibrate.value)
-        self._free_folder.visible = self._comparing.calibrate
+    def _set_calibrate(self, calibrate: bool) -> None:
+        self._comparing.calibrate = calibrate
+        self._free_folder.visible = calibrate
 
     def _set_window(self) -> None:
         self._from.visible = self._to.visible = bool(self._windowed.value)
@@ -135,11 +132,12 @@ class AskedControls:
                 one, value = on_axes(path, actuator.axes), actuator.value(path)
                 hint = f"{one.path}: {value:.4g} ± {tolerance.sigma:.2g} {one.unit}".rstrip() + " (1 σ)"
                 box = gui.add_checkbox(one.title, path in self._comparing.free, hint=hint)
-                box.on_update(lambda _, path=path, box=box: self._set_free(path, box))
+                free, set_free = partial(self._is_free, path), partial(self._comparing.set_free, path)
+                self._page.bind(box, free, set_free, at_once=True)
                 self._free.append(box)
 
-    def _set_free(self, path: str, box: Any) -> None:
-        self._page.checked(lambda: self._comparing.set_free(path, bool(box.value)), box)
+    def _is_free(self, path: str) -> bool:
+        return path in self._comparing.free
 
 
 # --- a form that makes an actuator's file -----------------------------------------------------------------------------
@@ -170,8 +168,8 @@ class NewActuator:
             )
             self._told = add_html(gui)
         for control in (self._motor, self._user, self._controller, self._drive):
-            control.on_update(lambda event: event.client and page.screen.post("new actuator", self._ask))
-        self._button.on_click(lambda _: page.screen.post("make actuator", self._make))
+            page.changed(control, self._ask)
+        page.pressed(self._button, self._make)
         self._ask()
 
     def _description(self) -> Description:
@@ -207,9 +205,6 @@ class NewActuator:
                     self._about.append(add_html(gui, _about(one)))
 
     def _make(self) -> None:
-        self._page.checked(self._save, self._button)
-
-    def _save(self) -> None:
         name, doubts = self._description().save(self._comparing.folder)
         self._take(name)
         lines = joined(html('<div style="color:{}">▲ {}</div>', COLOURS["warning"], line) for line in doubts)
@@ -239,28 +234,24 @@ class HeldOutControls:
         self._page, self._comparing = page, comparing
         gui = page.server.gui
         self._folder = gui.add_folder("Hold out for validation", visible=False)
-        self._boxes: dict[str, Any] = {}
+        self._boxes: dict[str, Bound] = {}
         with self._folder:
             add_html(gui, LONG_LABELS)
             self._told = add_html(gui)
             self._take = gui.add_button("Hold it out", icon=viser.Icon.EYE_OFF, visible=False)
-        self._take.on_click(lambda _: page.screen.post("proposal", self._take_proposal))
+        page.pressed(self._take, self._take_proposal)
 
     def show(self) -> None:
         """As the session has it; on the screen's thread."""
         comparing = self._comparing
         names = list(comparing.opened) if len(comparing.opened) > 1 else []
         if list(self._boxes) != names:
-            for box in self._boxes.values():
-                box.remove()
-            self._boxes = {}
+            for one in self._boxes.values():
+                one.control.remove()
             with self._folder:
-                for name in names:
-                    box = self._boxes[name] = self._page.server.gui.add_checkbox(Path(name).name, False)
-                    box.on_update(lambda event, name=name: event.client and self._hold_out(name))
-        for name, box in self._boxes.items():
-            if box.value != (name in comparing.held_out):
-                box.value = name in comparing.held_out
+                self._boxes = {name: self._box(name) for name in names}
+        for one in self._boxes.values():
+            one.show()
         one = comparing.proposal
         self._take.visible = one is not None
         if one is not None:
@@ -273,8 +264,10 @@ class HeldOutControls:
         self._told.content = note(text)
         self._folder.visible = bool(names)
 
-    def _hold_out(self, name: str) -> None:
-        self._comparing.hold_out(name, bool(self._boxes[name].value))
+    def _box(self, name: str) -> Bound:
+        comparing = self._comparing
+        box = self._page.server.gui.add_checkbox(Path(name).name, False)
+        return self._page.bind(box, lambda: name in comparing.held_out, partial(comparing.hold_out, name), at_once=True)
 
     def _take_proposal(self) -> None:
         one = self._comparing.proposal
@@ -384,26 +377,6 @@ def leads(page: Page, discovering: Discovering) -> Leads:
     )
 
 
-# --- what stays of a comparison: the report, which the browser also saves, and the recording for Rerun ----------------
-
-
-class KeepControls(KeepButtons):
-    """Two buttons, and what they have written."""
-
-    def __init__(self, page: Page, comparing: Comparing, viewer: ViewerHost | None) -> None:
-        super().__init__(
-            page,
-            "comparison",
-            comparing.folder,
-            viewer,
-            comparing.events.kept,
-            lambda suffix, _: comparing.save(suffix),
-            comparing.provenance,
-            REPORT,
-            RECORD,
-        )
-
-
 # --- the Compare tab: recordings in, their columns and health, what is compared, and the run --------------------------
 
 _NONE = "–"
@@ -439,26 +412,23 @@ class ComparePanel:
         with self._health_folder:
             self._health = add_html(gui)
         self.asked = AskedControls(page, comparing, uploads)
-        self._add_it.on_click(lambda _: self._add())
-        self._which.on_update(lambda event: event.client and self._post_show(str(self._which.value)))
+        page.pressed(self._add_it, self._add)
+        page.changed_to(self._which, self._show)
         for button in (self._columns, self.to_columns):
-            button.on_click(lambda _: page.screen.post("columns", self._open_columns))
-        self.to_fit.on_click(lambda _: page.screen.post("fit", self._close_columns))
-        self._remove.on_click(lambda _: self._remove_shown())
-        self._start.on_click(lambda _: comparing.ask())
+            page.pressed(button, self._open_columns)
+        page.pressed(self.to_fit, self._close_columns)
+        page.pressed(self._remove, self._remove_shown)
+        page.pressed(self._start, comparing.ask)
+        page.disable_while(comparing.job, self._start)  # while it runs it is asked for already
         standing.connect(self._start, self._forget_errors)
-        events = comparing.events
-        events.opened.connect(lambda opened: page.screen.post(f"opened {opened.name}", lambda: self._opened(opened)))
-        events.refused.connect(lambda: page.screen.post("columns", self._open_columns))
-        events.failed.connect(
-            lambda what, name, why: page.screen.post(f"failed to {what}", lambda: self._failed(what, name, why))
-        )
-        events.held.connect(lambda: page.screen.post("held out", self._show_held_out))
-        events.removed.connect(lambda: page.screen.post("removed", self._removed))
-        events.compared.connect(lambda found: page.screen.post("compared", lambda: self._compared(found)))
-        events.missing.connect(lambda why, by_hand: page.screen.post("missing", lambda: self._missing(why, by_hand)))
-        comparing.job.began.connect(lambda _: page.screen.post("compare runs", self._show_running))
-        comparing.job.ended.connect(lambda _: page.screen.post("compare runs", self._show_running))
+        events, hear = comparing.events, page.screen.hear
+        hear(events.opened, self._opened, each=lambda opened: opened.name)
+        hear(events.refused, self._open_columns)
+        hear(events.failed, self._failed, each=lambda what, name, why: what)
+        hear(events.held, self._show_held_out)
+        hear(events.removed, self._removed)
+        hear(events.compared, self._compared)
+        hear(events.missing, self._missing)
         self.refresh_files()
 
     def refresh_files(self) -> None:
@@ -532,9 +502,6 @@ class ComparePanel:
             if not self._comparing.running:
                 self._line.say("")
 
-    def _post_show(self, name: str) -> None:
-        self._page.screen.post("shown", lambda: self._show(name))
-
     def _show(self, name: str | None) -> None:
         """One of the recordings in the cards below the list."""
         everything = dict(self._comparing.opened)
@@ -588,10 +555,6 @@ class ComparePanel:
         self._page.say_beside(self._start, "")
         self._line.forget_refusal()
 
-    def _show_running(self) -> None:
-        """While one runs it is asked for already; else a press is carried out, or says what is missing."""
-        self._start.disabled = self._comparing.running
-
 
 # --- the Compare tab: the model beside measurements -------------------------------------------------------------------
 
@@ -613,7 +576,16 @@ class CompareTab(Tab):
                 shared.strip,
                 lambda preview: MappingStep(self.page, shared.comparing, preview),
                 self._leads,
-                lambda: KeepControls(self.page, shared.comparing, shared.viewer),
+                lambda: KeepButtons(
+                    self.page,
+                    shared.comparing.folder,
+                    shared.viewer,
+                    shared.comparing.events.kept,
+                    lambda suffix, _: shared.comparing.save(suffix),
+                    shared.comparing.provenance,
+                    REPORT,
+                    RECORD,
+                ),
                 self._run_example,
             )
 

@@ -6,6 +6,7 @@ import math
 import re
 from collections.abc import Callable, Collection, Iterable, Mapping
 from dataclasses import replace
+from functools import partial
 from itertools import pairwise
 from typing import Any
 
@@ -106,7 +107,7 @@ class RawLines:
         self._style = add_html(gui, visible=False)
         self._buttons: list[Any] = [gui.add_button("–", visible=False) for _ in range(_SHOWN)]
         for i, button in enumerate(self._buttons):
-            button.on_click(lambda _, i=i: page.screen.post("header line", lambda: self._choose(i)))
+            page.pressed(button, partial(self._choose, i))
 
     def show(self, opened: Opened) -> None:
         """The lines of a file, with its header among them; none of one that is no text."""
@@ -181,7 +182,7 @@ class LayoutControls:
             hint = "of a file without a time, in samples a second; 0 where a column is the time"
             self.rate = gui.add_number("Rate [Hz]", 0.0, min=0.0, max=1e9, step=1.0, hint=hint, visible=False)
         for control in (self.header, self._encoding, self.rate):
-            control.on_update(lambda event: event.client and page.screen.post("layout", self._say))
+            page.changed(control, self._say)
 
     def hide(self) -> None:
         """No file is read here now."""
@@ -483,7 +484,7 @@ class MappingStep:
         self._table = ColumnTable(page, self._edit, lambda: self.use)
         self._lines: RawLines | None = None
         self._page = page
-        self.use.on_click(lambda _: self._apply())
+        page.pressed(self.use, self._apply)
         self.hide()
 
     def add_lines(self) -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -138,8 +139,8 @@ class ComparePlots:
         with tabs.add_tab("Calibration", viser.Icon.TARGET):
             self._fit = [self._add(lambda v: campaign.calibration_scores(v.comparison), 0.8)]
             self._numbers = add_html(gui)
-        self._signal.on_update(lambda event: event.client and self._post([*self._time, *self._against, *self._turn]))
-        self._variable.on_update(lambda event: event.client and self._post(self._against))
+        page.changed(self._signal, lambda: self._draw([*self._time, *self._against, *self._turn]))
+        page.changed(self._variable, lambda: self._draw(self._against))
 
     def add_against(self) -> None:
         """The figure of `Against` a second time, at this place of the page."""
@@ -246,9 +247,6 @@ class ComparePlots:
     def _all(self) -> Iterator[_Plot]:
         for group in (self._time, self._against, self._turn, self._why, self._fit):
             yield from group
-
-    def _post(self, plots: list[_Plot]) -> None:
-        self._page.screen.post(f"plots {len(plots)}", lambda: self._draw(plots))
 
     def _draw(self, plots: list[_Plot]) -> None:
         if self._view is None:
@@ -359,7 +357,7 @@ class ResultPanel:
         with self._save:
             self._kept = keep()
         strip.moves.connect(self._moved)
-        self._recording.on_update(lambda event: event.client and self._chosen())
+        page.changed(self._recording, self._show_recording)
 
     # --- before a comparison ----------------------------------------------------------------------------------------
 
@@ -479,7 +477,7 @@ class ResultPanel:
                 button = self._page.server.gui.add_button(
                     region.sentence, icon=viser.Icon.FOCUS_2, hint=details(comparison, region)
                 )
-                button.on_click(lambda _, i=i: self._page.screen.post("region", lambda: self.select(i)))
+                self._page.pressed(button, partial(self.select, i))
                 self._buttons.append(button)
         self._style_regions(None)
 
@@ -510,13 +508,10 @@ class ResultPanel:
     def _all_together(self) -> bool:
         return self._recording.value == _TOGETHER
 
-    def _chosen(self) -> None:
-        def change() -> None:
-            if self._comparison is not None:
-                self._put(self._at())
-                self._plots.show(View(self._comparison, self._at(), self._region, together=self._all_together()))
-
-        self._page.screen.post("recording shown", change)
+    def _show_recording(self) -> None:
+        if self._comparison is not None:
+            self._put(self._at())
+            self._plots.show(View(self._comparison, self._at(), self._region, together=self._all_together()))
 
     def _moved(self, on: str, time_s: float, _: tuple[float, float]) -> None:
         """The clock has moved: the charts' line follows, while it plays once a second, as drawing them takes long."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -64,18 +65,16 @@ class SourceControls:
             for name, one in discovering.source.challenges.items()
         }
         self._names = self._listed()
-        gui, post = page.server.gui, page.screen.post
+        gui, hear_any = page.server.gui, page.screen.hear_any
         self._source = gui.add_dropdown(
             "Measurements", tuple(self._names), hint="Of Compare, or of a challenge: ● to ●●●●● say how hard"
         )
         uploads.add_button("Open a sealed challenge", CHALLENGE_SUFFIX, icon=viser.Icon.LOCK_OPEN, color="gray")
         self._about = add_html(gui)
-        self._source.on_update(lambda event: event.client and post("source", self._take))
-        discovering.sealing.sealed.connect(lambda _: post("sealed listed", self._refresh))
+        page.changed(self._source, self._take)
+        hear_any([discovering.sealing.sealed], self._refresh)
         compare = discovering.comparing.events
-        compare.opened.connect(lambda _: post("discover source", lambda: self.show(self._look)))
-        for changed in (compare.removed, compare.held):
-            changed.connect(lambda: post("discover source", lambda: self.show(self._look)))
+        hear_any([compare.opened, compare.removed, compare.held], lambda: self.show(self._look))
 
     def busy(self, busy: bool) -> None:
         """Whether a step runs."""
@@ -227,10 +226,9 @@ class Guide:
         with self._folder:
             self._text = add_html(gui)
             end = gui.add_button("Leave the guide", icon=viser.Icon.X, color="gray")
-        self._offer.on_click(lambda _: page.screen.post("guide", self._start))
-        end.on_click(lambda _: page.screen.post("guide", self._end))
-        discovering.events.revealed.connect(lambda: page.screen.post("guide", self.refresh))
-        discovering.job.began.connect(lambda _: page.screen.post("guide", self.refresh))
+        page.pressed(self._offer, self._start)
+        page.pressed(end, self._end)
+        page.screen.hear_any([discovering.events.revealed, discovering.job.began], self.refresh)
 
     def show(self, look: Look | None, opened: str | None) -> None:
         """The story is here now; on the screen's thread."""
@@ -269,15 +267,15 @@ class EntriesControl:
     """A dropdown, there once something was discovered, and one for a second that is to stand beside the first."""
 
     def __init__(self, page: Page, discovering: Discovering, beside: SideBySide) -> None:
-        self._page, self._discovering, self._both = page, discovering, beside
+        self._discovering, self._both = discovering, beside
         self._choice: Any = page.server.gui.add_dropdown(
             "Discovery", (_NEW,), visible=False, hint="Each is kept as it was left, and comes back at once"
         )
         self._beside: Any = page.server.gui.add_dropdown(
             "Beside", (_ALONE,), visible=False, hint="Another discovery, side by side with this one"
         )
-        self._choice.on_update(self._changed)
-        self._beside.on_update(lambda event: event.client and page.screen.post("beside", self._show_both))
+        page.changed_to(self._choice, self._take)
+        page.changed(self._beside, self._show_both)
 
     def show(self) -> None:
         """The list as it is now; on the screen's thread."""
@@ -306,19 +304,16 @@ class EntriesControl:
         """Whether a step runs."""
         self._choice.disabled = busy
 
-    def _changed(self, event: viser.GuiEvent[Any]) -> None:
-        if event.client is not None:
-            chosen = str(self._choice.value)
-            self._page.screen.post("discovery", lambda: self._take(chosen))
-
     def _take(self, chosen: str) -> None:
         discovering = self._discovering
         entry = next((one for one in discovering.entries.all if one.words == chosen), None)
-        if entry is None:
-            self._page.checked(lambda: discovering.choose(discovering.source.chosen), self._choice)
-        else:
-            self._page.checked(lambda: discovering.show(entry), self._choice)
-        self.show()
+        try:
+            if entry is None:
+                discovering.choose(discovering.source.chosen)
+            else:
+                discovering.show(entry)
+        finally:
+            self.show()
 
 
 # --- what stays of a discovery: the report, the recording for Rerun, and the improved model ---------------------------
@@ -335,10 +330,9 @@ class DiscoveryKeep(KeepButtons):
     """Buttons, and what they have written; of the model also whether it is what was found, and what a tool loses."""
 
     def __init__(self, page: Page, discovering: Discovering, viewer: ViewerHost | None) -> None:
-        events, self._discovering, self._page = discovering.events, discovering, page
+        events, self._discovering = discovering.events, discovering
         super().__init__(
             page,
-            "discovery",
             discovering.folder,
             viewer,
             events.kept,
@@ -346,11 +340,11 @@ class DiscoveryKeep(KeepButtons):
             discovering.provenance,
             *_BUTTONS,
         )
-        events.verified.connect(lambda path, text: page.screen.post("verified", lambda: self.name(path, text)))
+        page.screen.hear(events.verified, self.name)
 
     def _write(self, suffix: str, button: Any) -> None:
         if suffix == HOME.suffix:
-            self._page.ask("take home", lambda: self._page.begins(self._discovering.take_home, button))
+            self._page.begins(self._discovering.take_home, button)
         else:
             self._discovering.keep(suffix)
 
@@ -425,17 +419,16 @@ class DiscoverPanel:
         self.source.show(None)
 
     def _listen(self) -> None:
-        discovering, post = self._discovering, self._page.screen.post
-        self._start.on_click(lambda _: self._begin())
-        self._undo.on_click(lambda _: self._page.screen.post("undo", self._step_back))
+        page, events, job = self._page, self._discovering.events, self._discovering.job
+        page.pressed(self._start, self._begin)
+        page.pressed(self._undo, self._discovering.undo)
         for i, button in enumerate(self._removes):
-            button.on_click(lambda _, i=i: self._remove(i))
+            page.pressed(button, partial(self._remove, i))
         self._result.connect(self.ask, self._turn, self._run_example)
         self._own.connect(self.ask)
-        events, job = discovering.events, discovering.job
-        job.began.connect(lambda _: post("discover began", lambda: self._busy(True)))
-        events.looked.connect(lambda look: post("looked", lambda: self._show(look)))
-        job.ended.connect(lambda _: post("discover ended", self._ended))
+        page.screen.hear(job.began, lambda _: self._busy(True))
+        page.screen.hear(events.looked, self._show)
+        page.screen.hear(job.ended, lambda _: self._ended())
 
     # --- what is asked ----------------------------------------------------------------------------------------------
 
@@ -469,9 +462,6 @@ class DiscoverPanel:
         self._page.say_beside(self._start, "")
         if not self._discovering.running:
             self._line.say("")
-
-    def _step_back(self) -> None:
-        self._page.checked(self._discovering.undo, self._undo)
 
     def _remove(self, index: int) -> None:
         look = self._look
@@ -542,7 +532,7 @@ class DiscoverPanel:
 
     def _slot(self) -> Any:
         button = self._page.server.gui.add_button("", visible=False)
-        button.on_click(lambda _: self._page.screen.post("card", lambda: self._click(button)))
+        self._page.pressed(button, lambda: self._click(button))
         return button
 
     def _click(self, button: Any) -> None:

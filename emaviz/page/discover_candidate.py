@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 from typing import Any
 
 import plotly.graph_objects as go
@@ -185,8 +186,8 @@ class Cards:
 
     def connect(self, ask: Callable[[Callable[[], bool], Any, str], None], open_card: Callable[[str], None]) -> None:
         """ask(begin, button, title) starts a step; open_card(name) shows all of a candidate, on the screen's thread."""
-        post = self._page.screen.post
-        self._all.on_click(lambda _: ask(self._discovering.find_all, self._all, ""))
+        page = self._page
+        page.pressed(self._all, lambda: ask(self._discovering.find_all, self._all, ""))
 
         def add(slot: int) -> None:
             one = self._at(slot)
@@ -199,8 +200,8 @@ class Cards:
                 open_card(one.name)
 
         for slot, (opens, adds) in enumerate(zip(self._opens, self._adds)):
-            opens.on_click(lambda _, slot=slot: post("card", lambda: show(slot)))
-            adds.on_click(lambda _, slot=slot: add(slot))
+            page.pressed(opens, partial(show, slot))
+            page.pressed(adds, partial(add, slot))
 
     def busy(self, busy: bool) -> None:
         """Whether a step runs that a click on a card has to wait for."""
@@ -361,7 +362,7 @@ class ParameterSliders:
                     step=_step(low, high),
                     hint=f"Of the slider, and of the fit, in {begin.words}",
                 )
-            entry.on_update(lambda event, name=name: event.client and self._post_range(name))
+            self._page.changed(entry, partial(self._take_range, name))
             self._ranges[name] = entry
 
     @property
@@ -380,18 +381,12 @@ class ParameterSliders:
         hint = f"In {unit}. What it does is drawn below; the fit begins here"
         slider = self._page.server.gui.add_slider(name, low, high, _step(low, high), value, hint=hint)
         slider.precision = 7
-        slider.on_update(lambda event: event.client and self._set(name))
+        self._page.changed(slider, partial(self._set, name), at_once=True)
         return slider
 
     def _set(self, name: str) -> None:
         self._own_values.add(name)
         self._moved()
-
-    def _post_range(self, name: str) -> None:
-        def take() -> None:
-            self._page.checked(lambda: self._take_range(name), self._ranges[name])
-
-        self._page.screen.post(f"range of {name}", take)
 
     def _take_range(self, name: str) -> None:
         low, high = _range(name, self._ranges[name].value)
@@ -433,7 +428,7 @@ class EffectView:
     """A folder of the panel on the right, there while a card is open."""
 
     def __init__(self, page: Page, discovering: Discovering) -> None:
-        self._discovering = discovering
+        self._page, self._discovering = page, discovering
         self._name: str | None = None
         self._busy = self._untestable = False
         self._drawn: tuple[Any, str | None] = (None, None)
@@ -448,14 +443,14 @@ class EffectView:
 
     def connect(self, ask: Callable[[Callable[[], bool], Any], None], close: Callable[[], None]) -> None:
         """ask(begin, button) starts a step; close() closes the card."""
-        self._close.on_click(lambda _: close())
 
-        def add(_: Any) -> None:
+        def add() -> None:
             name = self._name
             if name is not None:
                 ask(lambda: self._discovering.add(name), self._add)
 
-        self._add.on_click(add)
+        self._page.pressed(self._close, close)
+        self._page.pressed(self._add, add)
 
     def busy(self, busy: bool) -> None:
         """Whether a step runs."""
@@ -593,15 +588,14 @@ class OwnEffect:
                 disabled=True,
                 hint="What is left, as a table of torque over the variable that explains it best",
             )
-        self._text.on_update(lambda event: event.client and page.screen.post("own effect", self._check))
-        events = discovering.events
-        events.previewed.connect(lambda found: page.screen.post("own preview", lambda: self._draw(found)))
-        events.unpreviewed.connect(lambda why: page.screen.post("own preview", lambda: self._hide(why)))
+        page.changed(self._text, self._check)
+        page.screen.hear(discovering.events.previewed, self._draw, kind=self)
+        page.screen.hear(discovering.events.unpreviewed, self._hide, kind=self)
 
     def connect(self, ask: Callable[[Callable[[], bool], Any], None]) -> None:
         """ask(begin, button) starts a step."""
-        self._add.on_click(lambda _: ask(self._begin, self._add))
-        self._curve.on_click(lambda _: ask(self._discovering.add_curve, self._curve))
+        self._page.pressed(self._add, lambda: ask(self._begin, self._add))
+        self._page.pressed(self._curve, lambda: ask(self._discovering.add_curve, self._curve))
 
     def busy(self, busy: bool) -> None:
         """Whether a step runs."""

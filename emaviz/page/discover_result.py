@@ -71,17 +71,13 @@ class NextTest:
             self._csv = gui.add_button(
                 "Command as CSV", icon=viser.Icon.FILE_SPREADSHEET, color="gray", visible=False, hint="For a test rig"
             )
-        self._load.on_click(
-            lambda event: page.screen.post(
-                "load test", lambda: self._with(lambda one: load(one, event.client), self._load)
-            )
-        )
-        self._csv.on_click(self._send)
-        discovering.events.unsuggested.connect(lambda: page.screen.post("unsuggested", self._nothing))
+        page.pressed_by(self._load, lambda client: self._with(lambda one: load(one, client)))
+        page.pressed_by(self._csv, self._send)
+        page.screen.hear(discovering.events.unsuggested, self._nothing)
 
     def connect(self, ask: Callable[[Callable[[], bool], Any], None]) -> None:
         """ask(begin, button) starts a step."""
-        self._find.on_click(lambda _: ask(self._discovering.suggest, self._find))
+        self._page.pressed(self._find, lambda: ask(self._discovering.suggest, self._find))
 
     def busy(self, busy: bool) -> None:
         """Whether a step runs."""
@@ -102,17 +98,14 @@ class NextTest:
     def _nothing(self) -> None:
         self._text.content = note("No test that the actuator can follow would tell the two apart.")
 
-    def _with(self, act: Callable[[Experiment], Any], button: Any) -> None:
+    def _with(self, act: Callable[[Experiment], object]) -> None:
         one = self._discovering.experiment
         if one is not None:
-            self._page.checked(lambda: act(one), button)
+            act(one)
 
-    def _send(self, event: viser.GuiEvent[viser.GuiButtonHandle]) -> None:
-        client = event.client
+    def _send(self, client: viser.ClientHandle | None) -> None:
         if client is not None:
-            self._with(
-                lambda one: client.send_file_download("next-test.csv", as_csv(one), save_immediately=True), self._csv
-            )
+            self._with(lambda one: client.send_file_download("next-test.csv", as_csv(one), save_immediately=True))
 
 
 def as_csv(one: Experiment) -> bytes:
@@ -139,7 +132,7 @@ class ActuatorSwitch:
         self._page, self._discovering, self._track, self._strip = page, discovering, track, strip
         self._shown: tuple[object, ...] = ()
         self._choice = page.server.gui.add_dropdown("3D actuator", _SHOWN, hint="What it plays")
-        self._choice.on_update(lambda event: event.client and page.screen.post("3D actuator", self.refresh))
+        page.changed(self._choice, self.refresh)
 
     def refresh(self) -> None:
         """Plays what is chosen of the present recording; on the screen's thread."""
@@ -270,9 +263,9 @@ class DiscoveryPanel:
             self._actuator = ActuatorSwitch(page, discovering, self._track, strip)
             self._residual: Any = gui.add_plotly(go.Figure(), config=CONFIG, aspect=0.5, visible=False)
             self._explained: Any = gui.add_plotly(go.Figure(), config=CONFIG, aspect=0.6, visible=False)
-        self._recording.on_update(lambda event: event.client and page.screen.post("residual", self._draw_residual))
-        self._signal.on_update(lambda event: event.client and page.screen.post("residual", self._draw_residual))
-        self._reveal.on_click(lambda _: page.screen.post("reveal", self._revealed))
+        for control in (self._recording, self._signal):
+            page.changed(control, self._draw_residual)
+        page.pressed(self._reveal, self._show_truth)
 
     def connect(
         self, ask: Callable[..., None], open_card: Callable[[str | None], None], example: Callable[[], object]
@@ -360,9 +353,6 @@ class DiscoveryPanel:
         self._explained.visible = look.assessment is not None and bool(look.explained_before)
         if look.assessment is not None and self._explained.visible:
             self._explained.figure = discovery.explained_steps(look.explained_before, look.assessment.left.explained)
-
-    def _revealed(self) -> None:
-        self._page.checked(self._show_truth, self._reveal)
 
     def _show_truth(self) -> None:
         if self._look is not None:

@@ -29,7 +29,7 @@ from emaviz.page.explore_charts import WORKSPACE, ChartsPanel, ExportControls
 from emaviz.page.panel import JobLine
 from emaviz.page.style import LONG_LABELS
 from emaviz.page.tab import Shared, Tab
-from emaviz.page.workspaces import Page
+from emaviz.page.workspaces import Bound, Page
 from emaviz.session.discovery_source import Sealing
 from emaviz.session.explore import Simulation
 from emaviz.session.files import recovered
@@ -158,7 +158,7 @@ class PlantControls:
 
     def __init__(self, page: Page) -> None:
         self._page = page
-        self._reads: list[tuple[Any, Callable[[], Any]]] = []  # controls, and what the session holds for them
+        self._bound: list[Bound] = []
         gui, settings, axes = page.server.gui, page.session.settings, page.session.actuator.axes
         of = partial(limits, Settings)
         away = "Distance" if axes.is_linear(USER) else "Angle"
@@ -208,8 +208,8 @@ class PlantControls:
             self._about = add_html(gui, visible=False)
             self._add = gui.add_button("Hide it in the plant", icon=viser.Icon.PLUS, color="gray", disabled=True)
         self._shown: dict[str, Any] = {}
-        self._choice.on_update(lambda event: event.client and page.screen.post("effect", self._chosen))
-        self._add.on_click(lambda _: page.screen.post("hide", self._hide))
+        page.changed(self._choice, self._chosen)
+        page.pressed(self._add, self._hide)
 
     def _chosen(self) -> None:
         name = self._titles.get(str(self._choice.value))
@@ -242,7 +242,8 @@ class PlantControls:
         self._shown[name] = folder
         with folder:
             for parameter in effect.parameters:
-                value = session.settings.effects[name][parameter.name]
+                read = partial(self._parameter, name, parameter.name)
+                value = read()
                 span = parameter.high - parameter.low
                 entry = gui.add_number(
                     parameter.label,
@@ -257,9 +258,12 @@ class PlantControls:
                     if name in session.settings.effects:
                         session.settings.set_effect(name, parameter, value)
 
-                self._listen(entry, setter)
+                self._bind(entry, setter, read)
             remove = gui.add_button("Remove the effect", icon=viser.Icon.X, color="gray")
-        remove.on_click(lambda _: self._page.screen.post(f"take out {name}", lambda: self._remove(name)))
+        self._page.pressed(remove, lambda: self._remove(name))
+
+    def _parameter(self, name: str, parameter: str) -> float:
+        return self._page.session.settings.effects[name][parameter]
 
     def _remove(self, name: str) -> None:
         folder = self._shown.pop(name, None)
@@ -269,21 +273,26 @@ class PlantControls:
 
     def show_settings(self) -> None:
         """Sets every control to what the session holds; on the screen's thread."""
-        for entry, read in self._reads:
-            entry.value = str(read()) if isinstance(entry.value, str) else read()
+        for one in self._bound:
+            one.show()
         for folder in self._shown.values():
             folder.remove()
         self._shown.clear()
         for name in self._page.session.settings.effects:
             self._show(name)
 
-    def _listen(self, entry: Any, setter: Callable[[Any], None], read: Callable[[], Any] | None = None) -> None:
-        if read is not None:
-            self._reads.append((entry, read))
-        entry.on_update(lambda event: event.client and self._change(lambda: setter(entry.value), entry))
+    def _listen(self, entry: Any, setter: Callable[[Any], None], read: Callable[[], Any]) -> None:
+        self._bound.append(self._bind(entry, setter, read))
 
-    def _change(self, change: Callable[[], Any], control: Any = None) -> bool:
-        good = self._page.checked(change, control)
+    def _bind(self, entry: Any, setter: Callable[[Any], None], read: Callable[[], Any]) -> Bound:
+        def take(value: Any) -> None:
+            setter(value)
+            self._page.session.refresh()
+
+        return self._page.bind(entry, read, take, at_once=True)
+
+    def _change(self, change: Callable[[], Any]) -> bool:
+        good = self._page.checked(change)
         if good:
             self._page.session.refresh()
         return good
@@ -325,10 +334,9 @@ class SealControls:
             "Seal as a challenge…", icon=viser.Icon.LOCK, color="gray", hint="One file for a colleague to solve"
         )
         JobLine(page, sealing.job, WORKSPACE)
-        self._button.on_click(lambda event: self._ask(event.client))
-        sealing.job.began.connect(lambda _: page.screen.post("sealing", lambda: self._busy(True)))
-        sealing.job.ended.connect(lambda _: page.screen.post("sealing", lambda: self._busy(False)))
-        sealing.sealed.connect(lambda path: page.screen.post("sealed", lambda: self._sealed(path)))
+        page.pressed_by(self._button, self._ask)
+        page.disable_while(sealing.job, self._button)
+        page.screen.hear(sealing.sealed, self._sealed)
 
     def _ask(self, client: viser.ClientHandle | None) -> None:
         if client is None:
@@ -344,7 +352,7 @@ class SealControls:
         def begin() -> None:
             self._begin(client, str(title.value), str(story.value), seal, modal.close)
 
-        seal.on_click(lambda _: self._page.screen.post("seal", begin))
+        self._page.pressed(seal, begin)
 
     def _begin(
         self, client: viser.ClientHandle, title: str, story: str, button: Any, close: Callable[[], None]
@@ -352,9 +360,6 @@ class SealControls:
         if self._page.begins(lambda: self._sealing.seal(title, story), button):
             self._asked = client
             close()
-
-    def _busy(self, busy: bool) -> None:
-        self._button.disabled = busy
 
     def _sealed(self, path: Path) -> None:
         self._page.notify("Challenge sealed", f"{path.name}: Discover lists it among the measurements.", "green")
@@ -376,7 +381,7 @@ class ExplorePanel:
         session = page.session
         self._undo = Undo(session.settings, lambda: session.plant, session.choose_plant)
         self._touched = 0  # the fault that was moved last
-        self._reads: list[tuple[Any, Callable[[], Any]]] = []  # controls, and what the session holds for them
+        self._bound: list[Bound] = []
         gui = page.server.gui
         self.status = add_html(gui, said("Starting…"))
         self._note = add_html(gui)
@@ -397,9 +402,9 @@ class ExplorePanel:
                 color="gray",
                 hint="Five severities of the fault that was moved last, beside each other",
             )
-        reset.on_click(lambda _: page.screen.post("preset", lambda: self._move_all(HEALTHY)))
-        self._back.on_click(lambda _: page.screen.post("undo", self.undo))
-        fanned.on_click(lambda _: page.screen.post("fan asked", lambda: fan(self._touched)))
+        page.pressed(reset, lambda: self._move_all(HEALTHY))
+        page.pressed(self._back, self.undo)
+        page.pressed(fanned, lambda: fan(self._touched))
         with gui.add_folder("Command"):
             self._command = gui.add_dropdown(
                 "Command", [cls.title for cls in COMMANDS.values()], initial_value=COMMANDS["chirp"].title
@@ -418,13 +423,13 @@ class ExplorePanel:
                 "Its faults", MONITORS, initial_value="healthy", hint="The faults that the monitor model has here"
             )
         settings = page.session.settings
-        self._preset.on_update(lambda event: event.client and page.screen.post("preset", self._take_preset))
-        self._command.on_update(lambda event: event.client and self._choose_command())
+        page.changed(self._preset, self._take_preset)
+        page.changed(self._command, self._choose_command, at_once=True)
         self._listen(duration, partial(settings.set, "duration_s"), lambda: settings.duration_s)
         # Set by the session as well, after which nothing is to be simulated again.
-        self.monitor.on_update(lambda event: event.client and self._take_monitor())
-        self._own.on_update(lambda event: event.client and page.screen.post("plant's model", self._take_plant))
-        page.session.events.plants.connect(lambda: page.screen.post("plants", self._plant_taken))
+        page.changed(self.monitor, self._take_monitor, at_once=True)
+        page.bind(self._own, lambda: page.session.plant, self._take_plant)
+        page.screen.hear(page.session.events.plants, self._plant_taken)
 
     def _take_monitor(self) -> None:
         self._change(lambda: self._page.session.settings.set("monitor", self.monitor.value))
@@ -440,10 +445,8 @@ class ExplorePanel:
         if self._model.content != line:
             self._model.content = line
 
-    def _take_plant(self) -> None:
-        session = self._page.session
-        if not self._page.checked(lambda: self._change_plant(lambda: session.choose_plant(self._own.value)), self._own):
-            self._own.value = session.plant
+    def _take_plant(self, name: str) -> None:
+        self._change_plant(lambda: self._page.session.choose_plant(name))
 
     def take_plant(self, name: str, actuator: Actuator) -> None:
         """An improved model plays the plant, on the screen's thread; InputError where Explore cannot simulate it."""
@@ -537,8 +540,8 @@ class ExplorePanel:
             self._command.value = COMMANDS[settings.command].title
             self._show_group()
             self._load.show()
-            for entry, read in self._reads:
-                entry.value = _written(read()) if isinstance(entry.value, str) else read()
+            for one in self._bound:
+                one.show()
         self._plant.show_settings()
         self.show_monitor(settings.monitor)
         self.set_faults(settings.k)
@@ -552,7 +555,7 @@ class ExplorePanel:
         slider = self._page.server.gui.add_slider(
             self._label(index), 0.0, 1.0, 0.005, value, hint=f"{fault.name}: {fault.title}, 0 … 1"
         )
-        slider.on_update(lambda event: event.client and self._slide(index))
+        self._page.changed(slider, partial(self._slide, index), at_once=True)
         return slider
 
     def _label(self, index: int) -> str:
@@ -571,30 +574,31 @@ class ExplorePanel:
     def _command_settings(self, name: str) -> list[Any]:
         inputs = []
         for f in fields(COMMANDS[name]):
-            default: Any = self._command_setting(name, f.name, f.default)
+            read = partial(self._command_setting, name, f.name, f.default)
+            default = read()
             label = labelled(self._page.session.actuator.axes.name(f.name, USER))
-            if isinstance(default, tuple):
-                entry = self._page.server.gui.add_text(label, "+".join(f"{value:g}" for value in default))
+            if isinstance(default, str):
+                entry = self._page.server.gui.add_text(label, default)
             else:
                 entry = self._page.server.gui.add_number(label, float(default), step=_step(float(default)))
                 entry.precision = _DECIMALS  # the step's own would show 0.448 Hz as 0
             setter = partial(self._page.session.settings.set_command_setting, name, f.name)
-            self._listen(entry, setter, partial(self._command_setting, name, f.name, f.default))
+            self._listen(entry, setter, read)
             inputs.append(entry)
         return inputs
 
     def _command_setting(self, name: str, setting: str, usual: Any) -> Any:
-        return self._page.session.settings.command_settings[name].get(setting, usual)
+        return _written(self._page.session.settings.command_settings[name].get(setting, usual))
 
     def _listen(self, entry: Any, setter: Callable[[Any], None], read: Callable[[], Any]) -> None:
         """A control's new value goes through its setter, then both models run; read() is what the session holds."""
-        self._reads.append((entry, read))
 
-        def changed(event: Any) -> None:
-            if event.client is not None:
-                self._change(lambda: setter(entry.value), entry)
+        def take(value: Any) -> None:
+            self._keep(entry)
+            setter(value)
+            self._page.session.refresh()
 
-        entry.on_update(changed)
+        self._bound.append(self._page.bind(entry, read, take, at_once=True))
 
     def _choose_command(self) -> None:
         name = next((n for n, cls in COMMANDS.items() if cls.title == self._command.value), None)
@@ -615,9 +619,9 @@ class ExplorePanel:
         return good
 
 
-def _written(value: Any) -> str:
-    """As it is typed: the numbers of a list are joined by plus signs."""
-    return "+".join(f"{one:g}" for one in value) if isinstance(value, (list, tuple)) else str(value)
+def _written(value: Any) -> Any:
+    """As it stands in its control: the numbers of a list are joined by plus signs."""
+    return "+".join(f"{one:g}" for one in value) if isinstance(value, (list, tuple)) else value
 
 
 def _step(default: float) -> float:
@@ -651,9 +655,8 @@ class ExploreTab(Tab):
         self.panel = ExplorePanel(self.page, self.charts.fan.ask_for)
         SealControls(self.page, self.shared.discovering.sealing)
         self.panel.note("\n".join(recovered(self.shared.comparing.folder.recordings)))
-        events, post = self.page.session.events, self.page.screen.post
-        events.simulated.connect(lambda simulation: post("signals", lambda: self._draw(simulation)))
-        events.status.connect(lambda text: post("status", lambda: self._status(text)))
+        self.page.screen.hear(self.page.session.events.simulated, self._draw)
+        self.page.screen.hear(self.page.session.events.status, self._status)
 
     def show_settings(self) -> None:
         """On the sliders and the command."""

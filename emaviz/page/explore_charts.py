@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 import viser
 
+from ema_model.errors import InputError
 from ema_model.faults import FAULTS, HEALTHY
 from ema_model.recordings import write_measurement
 from emaviz.colours import GHOST, MONITOR, REFERENCE
@@ -79,9 +80,9 @@ class ChartsPanel:
         with panel.add_tab("Export", viser.Icon.DOWNLOAD):
             export(self)
         strip.moves.connect(self._moved)
-        page.workspaces.in_front.came.connect(lambda _: slow.post("phases", self._draw_rest))
-        self._freeze.on_click(lambda _: page.screen.post("freeze", lambda: self._set_ghost(self._simulation)))
-        self._melt.on_click(lambda _: page.screen.post("freeze", lambda: self._set_ghost(None)))
+        slow.hear_any([page.workspaces.in_front.came], self._draw_rest)
+        page.pressed(self._freeze, lambda: self._set_ghost(self._simulation))
+        page.pressed(self._melt, lambda: self._set_ghost(None))
 
     def show(self, simulation: Simulation) -> None:
         """Draws a run; on the screen's thread."""
@@ -177,9 +178,9 @@ class FanView:
             self._charts = LiveFan(gui, page.session.actuator.axes)
             page.workspaces.heights.add(self._charts.handles, spare_px=-36)
             page.measuring.add(self._charts.handles, self._charts.lines, self._charts.zoom)
-        show.on_click(lambda _: self._ask())
-        self._fault.on_update(lambda event: event.client and self._ask())
-        page.session.events.fanned.connect(lambda fan: page.screen.post("fan", lambda: self._draw(fan)))
+        page.pressed(show, self._ask)
+        page.changed(self._fault, self._ask)
+        page.screen.hear(page.session.events.fanned, self._draw)
 
     def ask_for(self, fault: int) -> None:
         """Simulates and draws the fan of one fault, and brings it to the front of windows at Explore."""
@@ -226,17 +227,13 @@ class ExportControls:
     def _button(self, label: str, icon: viser.IconName, act: Callable[[viser.ClientHandle], None]) -> Any:
         button = self._page.server.gui.add_button(label, icon=icon, color="gray")
 
-        @button.on_click
-        def _(event: viser.GuiEvent[viser.GuiButtonHandle]) -> None:
-            client = event.client
-            if client is None:
-                return
+        def export(client: viser.ClientHandle | None) -> None:
             if self._page.session.simulation is None:
-                self._page.say_beside(button, "Nothing has been simulated yet.")
-                return
-            self._page.say_beside(button, "")
-            self._page.screen.post(f"export {label}", lambda: act(client))
+                raise InputError("Nothing has been simulated yet.")
+            if client is not None:
+                act(client)
 
+        self._page.pressed_by(button, export)
         return button
 
     def _run(self) -> Simulation:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from functools import partial
 from typing import Any
 
 import plotly.graph_objects as go
@@ -30,18 +31,6 @@ _TYPE = Keeps(
     viser.Icon.DEVICE_FLOPPY,
     "Means as values, and how far a further unit may be from them as tolerances",
 )
-
-
-class UnitsKeep(KeepButtons):
-    """Two buttons, and what they have written."""
-
-    def __init__(self, page: Page, comparing: ComparingUnits) -> None:
-        def save(suffix: str, button: Any) -> None:
-            page.ask(f"units {suffix}", lambda: comparing.save(suffix), button)
-
-        super().__init__(
-            page, "units", comparing.folder, None, comparing.events.kept, save, comparing.provenance, REPORT, _TYPE
-        )
 
 
 # --- units' panel on the right ----------------------------------------------------------------------------------------
@@ -86,7 +75,16 @@ class UnitsResult:
             self._document = add_html(gui)
         self._save = gui.add_folder("Keep it", visible=False)
         with self._save:
-            self._keep = UnitsKeep(page, comparing)
+            self._keep = KeepButtons(
+                page,
+                comparing.folder,
+                None,
+                comparing.events.kept,
+                lambda suffix, _: comparing.save(suffix),
+                comparing.provenance,
+                REPORT,
+                _TYPE,
+            )
         self._figures = gui.add_folder("Parameters of each unit", visible=False)
         with self._figures:
             add_html(gui, NEXT_COLUMN)
@@ -154,26 +152,24 @@ class UnitsPanel:
         self._page, self._comparing, self._result = page, comparing, result
         self._example_asked = False
         result.run_example = self._run_example
-        gui, post = page.server.gui, page.screen.post
+        gui, screen, job = page.server.gui, page.screen, comparing.job
         add_html(gui, note(_ABOUT))
         hint = "Folders of the data folder that hold units"
         self._folder = FolderChoice(page, "Units", hint, self._listed, lambda: comparing.chosen, self._take_folder)
         self._practice = PracticeButtons(page, comparing.practice, self.choose)
-        self._rule = gui.add_text(
-            "Hold out",
-            comparing.rule,
-            hint="Recordings of such a name are not fitted, but check the result: *unseen*; empty for none",
-        )
-        self._actuator: Any = gui.add_dropdown("Actuator", (comparing.actuator_name,), hint="The units' type")
+        hint = "Recordings of such a name are not fitted, but check the result: *unseen*; empty for none"
+        rule = gui.add_text("Hold out", comparing.rule, hint=hint)
+        actuator: Any = gui.add_dropdown("Actuator", (comparing.actuator_name,), hint="The units' type")
+        self._rule = page.bind(rule, lambda: comparing.rule, partial(setattr, comparing, "rule"))
+        self._actuator = page.bind(actuator, lambda: comparing.actuator_name, comparing.choose_actuator)
         self._start = gui.add_button("Compare units", icon=WORKSPACE.icon, disabled=True)
-        self._line = JobLine(page, comparing.job, WORKSPACE, pauses="it")
-        self._rule.on_update(lambda event: event.client and post("units rule", self._take_rule))
-        self._actuator.on_update(lambda event: event.client and post("units actuator", self._take_actuator))
-        self._start.on_click(lambda _: post("compare units", self._begin))
+        self._line = JobLine(page, job, WORKSPACE, pauses="it")
+        page.pressed(self._start, self._begin)
+        page.disable_while(job, self._folder.control, rule, actuator)
         standing.connect(self._start, self._forget_errors)
-        comparing.job.began.connect(lambda _: post("units began", lambda: self._busy(True)))
-        comparing.job.ended.connect(lambda _: post("units ended", lambda: self._busy(False)))
-        comparing.events.compared.connect(lambda found: post("units compared", lambda: result.show(found)))
+        screen.hear(job.began, lambda _: self._practice.fold())
+        screen.follow(job, self._busy)
+        screen.hear(comparing.events.compared, result.show)
         self.refresh()
 
     def refresh(self) -> None:
@@ -181,9 +177,9 @@ class UnitsPanel:
         comparing = self._comparing
         self._folder.refresh()
         actuators = tuple(comparing.actuators())
-        if tuple(self._actuator.options) != actuators:
-            self._actuator.options = actuators
-            self._actuator.value = comparing.actuator_name
+        if tuple(self._actuator.control.options) != actuators:
+            self._actuator.control.options = actuators
+            self._actuator.show()
         self._start.disabled = comparing.job.running or self._folder.empty
 
     def choose(self, name: str) -> None:
@@ -201,9 +197,9 @@ class UnitsPanel:
     def show(self) -> None:
         """What is chosen and its answer, as a session's file says."""
         comparing = self._comparing
-        self._rule.value = comparing.rule
+        self._rule.show()
         self.refresh()
-        self._actuator.value = comparing.actuator_name
+        self._actuator.show()
         self._practice.show(comparing.chosen)
         if comparing.found is not None:
             self._practice.fold()
@@ -225,14 +221,6 @@ class UnitsPanel:
         self._result.show(None)
         self._line.say("")
 
-    def _take_rule(self) -> None:
-        self._comparing.rule = str(self._rule.value)
-
-    def _take_actuator(self) -> None:
-        comparing = self._comparing
-        if not self._page.checked(lambda: comparing.choose_actuator(str(self._actuator.value)), self._actuator):
-            self._actuator.value = comparing.actuator_name
-
     def _begin(self) -> None:
         if not self._page.begins(self._comparing.begin, self._start):
             self._comparing.provenance.refused()
@@ -244,11 +232,6 @@ class UnitsPanel:
 
     def _busy(self, busy: bool) -> None:
         self._result.busy(busy)
-        if busy:
-            self._practice.fold()
-        with self._page.server.atomic():
-            for control in (self._start, self._folder.control, self._rule, self._actuator):
-                control.disabled = busy
         self.refresh()
 
 

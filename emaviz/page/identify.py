@@ -78,9 +78,9 @@ class SwarmView:
             "Iteration", 0, 150, 1, 150, disabled=True, visible=False, hint="Looks back once it is over"
         )
         for entry in (self._kind, self._iteration):
-            entry.on_update(lambda event: event.client and page.screen.post("swarm view", self._changed))
+            page.changed(entry, self._changed)
         for entry in (self._x, self._y):
-            entry.on_update(lambda event: event.client and page.screen.post("swarm axes", self._choose))
+            page.changed(entry, self._choose)
 
     def appear(self) -> None:
         """There is something to look at."""
@@ -198,13 +198,11 @@ class LandscapeView:
             add_html(gui, NEXT_COLUMN)
         self._words = add_html(gui)
         for entry in (self._x, self._y):
-            entry.on_update(lambda event: event.client and self._chosen())
-        self._draw.on_click(lambda _: page.screen.post("landscape", self._begin))
-        landscapes, post = self._landscapes, page.screen.post
-        landscapes.job.began.connect(lambda _: post("landscape runs", lambda: self._busy(True)))
-        landscapes.job.ended.connect(lambda _: post("landscape runs", lambda: self._busy(False)))
-        landscapes.grown.connect(lambda *found: slow.post("landscape", lambda: self._draw_map(*found)))
-        landscapes.drawn.connect(lambda *found: post("landscape ways", lambda: self._say_ways(*found)))
+            page.changed(entry, self._chosen, at_once=True)
+        page.pressed(self._draw, self._begin)
+        page.screen.follow(self._landscapes.job, self._busy)
+        slow.hear(self._landscapes.grown, self._draw_map, kind="landscape")
+        page.screen.hear(self._landscapes.drawn, self._say_ways)
 
     def answered(self, race: Race) -> None:
         """A race is over; on the screen's thread."""
@@ -358,9 +356,9 @@ class IdentifyResult:
             self._clear_table: Any = gui.add_button(
                 "Clear the table", icon=viser.Icon.ERASER, color="gray", visible=False
             )
-        self._try.on_click(lambda event: page.screen.post("separating", lambda: self._try_separating(event.client)))
-        self._whose.on_update(lambda _: slow.post("answer", self._draw_answer))
-        self._clear_table.on_click(lambda _: page.screen.post("runs", self._clear))
+        page.pressed_by(self._try, self._try_separating)
+        page.changed(self._whose, self._draw_answer, on=slow)
+        page.pressed(self._clear_table, lambda: self.show_rows([]))
         page.workspaces.entered.connect(lambda name: name == WORKSPACE.name and self.draw())
 
     # --- from the compute thread ------------------------------------------------------------------------------------
@@ -427,12 +425,10 @@ class IdentifyResult:
         self._table.content = table(self.rows)
         self._clear_table.visible = bool(self.rows)
 
-    def _clear(self) -> None:
-        self.show_rows([])
-
     def _try_separating(self, client: viser.ClientHandle | None) -> None:
         run = self._separating
-        if run is not None and self._page.checked(lambda: self._to_explore(run), self._try):
+        if run is not None:
+            self._to_explore(run)
             self._page.notify("Explore has the command", "On Identify, press Identify again.", "green")
             self._page.workspaces.go("explore", client)
 
@@ -526,23 +522,25 @@ class IdentifyPanel:
             self._ticks = {
                 name: gui.add_checkbox(title, name in settings.algorithms) for name, title in ALGORITHMS.items()
             }
-            self._population = gui.add_number("Population", settings.population, **of("population"), step=1)
-            self._iterations = gui.add_number("Iterations", settings.iterations, **of("iterations"), step=1)
-            self._fitness: Any = gui.add_dropdown(
+            population = gui.add_number("Population", settings.population, **of("population"), step=1)
+            iterations = gui.add_number("Iterations", settings.iterations, **of("iterations"), step=1)
+            fitness: Any = gui.add_dropdown(
                 "Fitness",
                 FITNESSES,
                 initial_value=settings.fitness,
                 hint="What a search makes small, the current's rms error: filtered compares means over 0.5 ms, without "
                 "the inverter's ripple, which the model does not have; raw every sample, as the thesis does",
             )
-            self._seed = gui.add_number("Seed", settings.seed, min=0, step=1)  # a maximum would be put in silently
-        for entry, name in (
-            (self._population, "population"),
-            (self._iterations, "iterations"),
-            (self._fitness, "fitness"),
-            (self._seed, "seed"),
-        ):
-            self._listen(entry, partial(settings.set, name))
+            seed = gui.add_number("Seed", settings.seed, min=0, step=1)  # a maximum would be put in silently
+        self._bound = [
+            page.bind(control, partial(getattr, settings, name), partial(settings.set, name), at_once=True)
+            for control, name in (
+                (population, "population"),
+                (iterations, "iterations"),
+                (fitness, "fitness"),
+                (seed, "seed"),
+            )
+        ]
         self._start = gui.add_button("Identify", icon=viser.Icon.SEARCH)
         self._line = JobLine(page, page.session.identifying.job, WORKSPACE, pauses="the search")
         self._line.say("Finds the faults from the current alone.")
@@ -562,23 +560,22 @@ class IdentifyPanel:
             visible=False,
             hint="The model does not fit: takes the same measurement to Discover",
         )
-        self._source.on_update(lambda event: event.client and page.screen.post("identify source", self._take_source))
+        self._chosen = page.bind(self._source, lambda: settings.source or PLANT, self._take_source)
         for tick in self._ticks.values():
-            tick.on_update(lambda event: event.client and page.screen.post("algorithms", self._take_algorithms))
-        self._start.on_click(lambda _: self.begin())
+            page.changed(tick, self._take_algorithms)
+        page.pressed(self._start, self.begin)
         standing.connect(self._start, self._forget_errors)
-        self._watch.on_click(lambda event: page.screen.post("watch", lambda: self._watch_growing(event.client)))
-        self._missing.on_click(
-            lambda event: page.screen.post("to discover", lambda: self._look_for_missing(event.client))
-        )
-        identifying, post = page.session.identifying, page.screen.post
-        identifying.progressed.connect(self._progressed)
-        identifying.identified.connect(lambda race: post("identification", lambda: self._draw_answer(race)))
-        identifying.brought.connect(lambda race: post("identification", lambda: self._draw_answer(race, brought=True)))
-        identifying.job.began.connect(lambda _: post("search began", self._began))
-        identifying.job.rests.connect(lambda _: post("search rests", result.draw))
-        identifying.job.ended.connect(lambda _: post("search ended", self._ended))
-        comparing.events.opened.connect(lambda _: page.screen.post("sources", self.refresh_sources))
+        page.pressed_by(self._watch, self._watch_growing)
+        page.pressed_by(self._missing, self._look_for_missing)
+        identifying, hear = page.session.identifying, page.screen.hear
+        identifying.progressed.connect(result.progressed)
+        hear(identifying.progressed, self._draw, kind=self)
+        hear(identifying.identified, self._draw_answer, kind=self)
+        hear(identifying.brought, self._bring_answer, kind=self)
+        hear(identifying.job.began, lambda _: self._began())
+        hear(identifying.job.rests, lambda _: result.draw())
+        hear(identifying.job.ended, lambda _: self._ended())
+        page.screen.hear_any([comparing.events.opened], self.refresh_sources)
         self.refresh_sources()
 
     # --- what is asked ----------------------------------------------------------------------------------------------
@@ -588,7 +585,7 @@ class IdentifyPanel:
         names = (PLANT, *self._comparing.folder.measurements())
         if tuple(self._source.options) != names:
             self._source.options = names
-        self._source.value = self._page.session.settings.source or PLANT
+        self._chosen.show()
 
     def show_settings(self) -> None:
         """Sets the controls to what the session holds; on the screen's thread."""
@@ -596,14 +593,11 @@ class IdentifyPanel:
         self.refresh_sources()
         for name, tick in self._ticks.items():
             tick.value = name in settings.algorithms
-        self._population.value, self._iterations.value = settings.population, settings.iterations
-        self._fitness.value, self._seed.value = settings.fitness, settings.seed
+        for one in self._bound:
+            one.show()
 
-    def _take_source(self) -> None:
-        name = str(self._source.value)
-        settings = self._page.session.settings
-        if not self._page.checked(lambda: settings.set("source", SLIDERS if name == PLANT else name), self._source):
-            self.refresh_sources()
+    def _take_source(self, name: str) -> None:
+        self._page.session.settings.set("source", SLIDERS if name == PLANT else name)
 
     def _take_algorithms(self) -> None:
         settings = self._page.session.settings
@@ -611,12 +605,6 @@ class IdentifyPanel:
         if not self._page.checked(lambda: settings.set("algorithms", chosen), last):
             for name, tick in self._ticks.items():
                 tick.value = name in settings.algorithms
-
-    def _listen(self, entry: Any, setter: Callable[[Any], None]) -> None:
-        def changed(_: Any) -> None:
-            self._page.checked(lambda: setter(entry.value), entry)
-
-        entry.on_update(changed)
 
     # --- the race ---------------------------------------------------------------------------------------------------
 
@@ -652,10 +640,6 @@ class IdentifyPanel:
         if race is not None and self._page.checked(lambda: self._to_discover(race)):
             self._page.workspaces.go("discover", client)
 
-    def _progressed(self, race: Race) -> None:
-        self._result.progressed(race)
-        self._page.screen.post("identification", lambda: self._draw(race))
-
     def _draw(self, race: Race) -> None:
         lines = []
         for name, track in race.tracks.items():
@@ -673,7 +657,18 @@ class IdentifyPanel:
         self._race = race
         self._text.content = explained(joined(lines))
 
-    def _draw_answer(self, race: Race, *, brought: bool = False) -> None:
+    def _draw_answer(self, race: Race) -> None:
+        self._say_answer(race)
+        self._result.finished(race)
+
+    def _bring_answer(self, race: Race) -> None:
+        """One of a session."""
+        self._say_answer(race)
+        best = race.best
+        self._line.say(in_one_line(best.answer) if best is not None and best.answer is not None else "")
+        self._result.brought(race)
+
+    def _say_answer(self, race: Race) -> None:
         best = race.best
         lines = []
         for answer in race.answers:
@@ -686,11 +681,6 @@ class IdentifyPanel:
         self._text.content = explained(joined(lines))
         self._race = race
         self._missing.visible = best is not None and best.answer is not None and not best.answer.uncertainty.adequate
-        if brought:
-            self._line.say(in_one_line(best.answer) if best is not None and best.answer is not None else "")
-            self._result.brought(race)
-        else:
-            self._result.finished(race)
         if race.path is not None:
             self._link.content = recording_link(self._viewer, race.path, "Open this run in Rerun ↗")
 

@@ -53,7 +53,7 @@ class EffectPage:
         page.measuring.add(self._charts.handles, self._charts.lines, self._charts.zoom)
         page.workspaces.heights.add(self._charts.handles)
         page.workspaces.entered.connect(self._enter)
-        self._run.on_update(lambda event: event.client and self._ask())
+        page.changed(self._run, self._ask, at_once=True)
 
     def _enter(self, workspace: str) -> None:
         """A first visit finds an effect opened."""
@@ -112,7 +112,7 @@ class EffectPage:
             step = float(f"{(high - low) / 400.0:.0e}")
             low, high = min(_inwards(low), middle), max(-_inwards(-high), middle)
             slider = gui.add_slider(one.label, low, high, step, middle, hint=one.meaning)
-        slider.on_update(lambda event: event.client and self._ask())
+        self._page.changed(slider, self._ask, at_once=True)
         return slider
 
     def _ask(self) -> None:
@@ -142,7 +142,7 @@ class LibraryPanel:
     """Search and cards on the left."""
 
     def __init__(self, page: Page, library: Library, opened: EffectPage) -> None:
-        self._page, self._library, self._effect = page, library, opened
+        self._page, self._effect = page, opened
         self._pictures: dict[str, str] = {}
         gui = page.server.gui
         self._search = gui.add_text("Search", "", hint="In names, equations and explanations")
@@ -156,15 +156,15 @@ class LibraryPanel:
         self._cards = {name: self._card(effect) for name, effect in CATALOGUE.items()}
         self._none = add_html(gui, note("No effect of the library has this."), visible=False)
         self._draw_style()
-        self._search.on_update(lambda event: event.client and page.screen.post("search", self._filter))
-        self._draw.on_click(lambda _: self._run_all())
-        library.events.said.connect(lambda text: page.screen.post("library says", lambda: opened.say(text)))
-        library.events.drawn.connect(lambda felt: page.screen.post(f"drawn {felt.name}", lambda: self._drawn(felt)))
-        library.events.felt.connect(lambda felt: page.screen.post("felt", lambda: opened.show(felt)))
+        page.changed(self._search, self._filter)
+        page.pressed(self._draw, lambda: page.begins(library.draw_all, self._draw))
+        page.screen.hear(library.events.said, opened.say)
+        page.screen.hear(library.events.drawn, self._drawn, each=lambda felt: felt.name)
+        page.screen.hear(library.events.felt, opened.show)
 
     def _card(self, effect: Effect) -> Any:
         button = self._page.server.gui.add_button(f"{effect.title}\n{effect.shows}")
-        button.on_click(lambda _: self._page.screen.post("open effect", lambda: self._effect.open(effect.name)))
+        self._page.pressed(button, lambda: self._effect.open(effect.name))
         return button
 
     def _filter(self) -> None:
@@ -177,9 +177,6 @@ class LibraryPanel:
                 if button.visible != fits:
                     button.visible = fits
             self._none.visible = shown == 0
-
-    def _run_all(self) -> None:
-        self._page.begins(self._library.draw_all, self._draw)
 
     def _drawn(self, felt: WithEffect) -> None:
         self._pictures[felt.name] = small_picture(felt)

@@ -6,6 +6,7 @@ import json
 import threading
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any, Protocol
 
@@ -88,15 +89,14 @@ class JobLine:
         self._stop = gui.add_button(stop, icon=viser.Icon.PLAYER_STOP, color="red", visible=False)
         self._bar = gui.add_progress_bar(100.0, animated=True, visible=False)
         self._text = add_html(gui)
-        self._name = f"job {id(self)}"
-        post = page.screen.post
-        self._pause.on_click(lambda _: post(f"{self._name} rests", lambda: job.pause(not job.paused)))
-        self._stop.on_click(lambda _: post(f"{self._name} stops", self._ask_to_stop))
-        job.began.connect(lambda title: post(self._name, lambda: self._began(title)))
-        job.waits.connect(lambda text: post(f"{self._name} waits", lambda: self._waits(text)))
-        job.progressed.connect(lambda *said: post(f"{self._name} goes on", lambda: self._goes_on(*said)))
-        job.rests.connect(lambda rests: post(f"{self._name} is paused", lambda: self._show_paused(rests)))
-        job.ended.connect(lambda text: post(self._name, lambda: self._ended(text)))
+        page.pressed(self._pause, lambda: job.pause(not job.paused))
+        page.pressed(self._stop, self._ask_to_stop)
+        hear = page.screen.hear
+        hear(job.began, self._began, kind=self)
+        hear(job.waits, self._waits)
+        hear(job.progressed, self._goes_on)
+        hear(job.rests, self._show_paused)
+        hear(job.ended, self._ended, kind=self)
 
     def say(self, text: str, *, refuses: bool = False) -> None:
         """On the screen's thread; refuses: it says what is wrong with what is chosen, until something else is."""
@@ -176,11 +176,10 @@ class FolderChoice:
         take: Callable[[str], None],
     ) -> None:
         """listed(): names by title; chosen(): the one taken; take(name): another one, on the screen's thread."""
-        self._page, self._listed, self._chosen, self._take_name = page, listed, chosen, take
+        self._listed, self._chosen, self._take_name = listed, chosen, take
         self._names: dict[str, str] = {}
-        self._what = label
         self.control: Any = page.server.gui.add_dropdown(label, (_NONE,), hint=hint)
-        self.control.on_update(lambda event: event.client and self._ask())
+        page.changed_to(self.control, self._take)  # as it is chosen now: the list may be about to be read again
 
     @property
     def empty(self) -> bool:
@@ -203,11 +202,6 @@ class FolderChoice:
         """A folder by its name; on the screen's thread."""
         self.refresh()
         self._take(next(title for title, one in self._names.items() if one == name))
-
-    def _ask(self) -> None:
-        """As it is chosen now: the list may be about to be read again."""
-        title = str(self.control.value)
-        self._page.screen.post(f"folder of {self._what}", lambda: self._take(title))
 
     def _take(self, title: str) -> None:
         name = self._names.get(title)
@@ -232,7 +226,7 @@ class Example:
         """run(): on the screen's thread; what it refuses is told to all."""
         pressed: Any = page.server.gui.add_button(title, color="gray")
         add_html(page.server.gui, unseen([id_of(pressed)]))
-        pressed.on_click(lambda _: page.ask(f"example {title}", run))
+        page.pressed(pressed, lambda: page.checked(run))
         self.html = html(
             '<div style="padding-top:12px;display:flex;gap:12px;align-items:center">'
             '<button style="{};white-space:nowrap" onclick="window.emavizPress(\'{}\')">▶ {}</button>'
@@ -270,16 +264,13 @@ class Leads:
     def _add(self, lead: Lead) -> Any:
         button: Any = self._page.server.gui.add_button(lead.label, icon=lead.icon, hint=lead.hint, color=lead.colour)
 
-        def follow(event: viser.GuiEvent[Any]) -> None:
-            def taken() -> None:
-                if self._page.checked(lead.take, button):
-                    self._page.workspaces.go(lead.to, event.client)
-                    if lead.begins is not None:
-                        self._page.begins(lead.begins, button)
+        def follow(client: viser.ClientHandle | None) -> None:
+            lead.take()
+            self._page.workspaces.go(lead.to, client)
+            if lead.begins is not None:
+                self._page.begins(lead.begins, button)
 
-            self._page.screen.post(f"lead {lead.label}", taken)
-
-        button.on_click(follow)
+        self._page.pressed_by(button, follow)
         return button
 
 
@@ -314,7 +305,6 @@ class KeepButtons:
     def __init__(
         self,
         page: Page,
-        what: str,
         folder: DataFolder,
         viewer: ViewerHost | None,
         kept: Signal[[Path]],
@@ -322,26 +312,33 @@ class KeepButtons:
         provenance: Provenance,
         *buttons: Keeps,
     ) -> None:
-        """what: is kept, a word that no other tab has; save(suffix, button): asks for the file; kept: it is written.
+        """save(suffix, button): asks for the file, for a link without a button; kept: it is written.
 
         provenance: of the result, which is written as it was computed.
         """
-        self._provenance = provenance
+        self._page, self._provenance = page, provenance
         makes = [one.suffix for one in buttons if one in (REPORT, RECORD)]
-        self._files = provenance.files = ResultFiles(makes, lambda: provenance.of, lambda suffix: save(suffix, None))
+        self._files = provenance.files = ResultFiles(
+            makes, lambda: provenance.of, lambda suffix: page.ask((self, suffix), lambda: save(suffix, None))
+        )
         self._folder, self._viewer, self._save = folder, viewer, save
         self._asked: viser.ClientHandle | None = None  # who is sent the file
-        self._gui = gui = page.server.gui
+        gui = page.server.gui
         add_html(gui, IN_ROW)
         for one in buttons:
             self.add(one)
         self._links = add_html(gui)
-        kept.connect(lambda path: page.screen.post(f"{what} kept {path.suffix}", lambda: self._kept(path)))
+        page.screen.hear(kept, self._kept, each=lambda path: path.suffix)
 
     def add(self, one: Keeps) -> None:
         """One more button, where the page is being built."""
-        button = self._gui.add_button(one.label, icon=one.icon, hint=one.hint)
-        button.on_click(lambda event: self._ask(event.client, one.suffix, button))
+        button = self._page.server.gui.add_button(one.label, icon=one.icon, hint=one.hint)
+
+        def save(client: viser.ClientHandle | None) -> None:
+            self._asked = client
+            self._save(one.suffix, button)
+
+        self._page.pressed_by(button, save)
 
     def clear(self) -> None:
         """Something else is shown: what was kept before is told no more."""
@@ -358,10 +355,6 @@ class KeepButtons:
     def said_at_once(self, path: Path) -> str:
         """What is to be said of a file that has just been written."""
         return ""
-
-    def _ask(self, client: viser.ClientHandle | None, suffix: str, button: Any) -> None:
-        self._asked = client
-        self._save(suffix, button)
 
     def _kept(self, path: Path) -> None:
         if self._files.came(path):
@@ -393,12 +386,8 @@ class PracticeButtons:
                     color="gray",
                     hint="Its recordings are made in the data folder, in some seconds",
                 )
-                button.on_click(
-                    lambda _, one=one, button=button: page.ask(
-                        "challenge", lambda: page.begins(lambda: practice.open(one), button)
-                    )
-                )
-        practice.made.connect(lambda name: page.screen.post("challenge made", lambda: chosen(name)))
+                page.pressed(button, partial(page.begins, partial(practice.open, one), button))
+        page.screen.hear(practice.made, chosen)
 
     def show(self, folder: str) -> None:
         """The story of the challenge in a folder, if it holds one."""
@@ -426,7 +415,7 @@ class Seal:
         with self._place:
             button = gui.add_button("Open the seal", icon=viser.Icon.LOCK_OPEN, color="gray")
             self._told = add_html(gui)
-        button.on_click(lambda _: page.ask("seal", self._open, button))
+        page.pressed(button, self._open)
 
     def show(self) -> None:
         """Something else is shown: the seal is closed again."""
@@ -472,18 +461,15 @@ class JobBar:
                 for _ in range(_MOST_WAITING)
             ]
         self._panel.float(x=0, y=-1, width=480)
-        self._stop.on_click(lambda _: self._slow.post("job bar stops", self._ask_to_stop))
+        page.pressed(self._stop, self._ask_to_stop, on=slow)
         for place, button in enumerate(self._places):
-            button.on_click(lambda _, place=place: self._slow.post("job bar line", lambda: self._take_out(place)))
-        self._jobs.changed.connect(self._soon)
+            page.pressed(button, partial(self._take_out, place), on=slow)
+        slow.hear_any([self._jobs.changed], self._draw)
 
     def close(self) -> None:
         """Ends its clock."""
         if self._ends_at is not None:
             self._ends_at.cancel()
-
-    def _soon(self) -> None:
-        self._slow.post("job bar", self._draw)
 
     # --- what is pressed --------------------------------------------------------------------------------------------
 
@@ -538,7 +524,7 @@ class JobBar:
 
     def _forget_end(self) -> None:
         self._ending = False
-        self._soon()
+        self._slow.post("job bar", self._draw)
 
     def _going_on(self, at: AtWork) -> Html:
         title = self._way(at.job, at.job.title)

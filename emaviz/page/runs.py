@@ -57,14 +57,11 @@ class SessionControls:
         lacking: Callable[[], Mapping[str, str]],
     ) -> None:
         """kept(): the parts of the page; lacking(): what each tab has to compute again, by its title."""
-        self._page, self._comparing, self._files, self._kept = page, comparing, files, kept
-        self._lacking = lacking
+        self._page, self._comparing, self._kept, self._lacking = page, comparing, kept, lacking
         gui = page.server.gui
         with gui.add_folder("Session: everything on the page"):
             self._name = gui.add_text("Session name", f"session-{datetime.now():%Y%m%d}")
-            self._save_it = gui.add_button(
-                "Save session", icon=viser.Icon.DEVICE_FLOPPY, hint="To the data folder, and here"
-            )
+            save = gui.add_button("Save session", icon=viser.Icon.DEVICE_FLOPPY, hint="To the data folder, and here")
             self._choice: Any = gui.add_dropdown("Saved", (_NONE,))
             self._load = gui.add_button("Load session", icon=viser.Icon.FOLDER_OPEN, color="gray", disabled=True)
             self._loaded = add_html(gui)
@@ -76,8 +73,8 @@ class SessionControls:
                     SESSION_SUFFIX,
                 ),
             )
-        self._save_it.on_click(lambda event: self._post("save session", lambda: self._save(event.client)))
-        self._load.on_click(lambda _: self._load_named(str(self._choice.value)))
+        page.pressed_by(save, self._save, on=files)
+        self._load.on_click(lambda _: self._load_named(str(self._choice.value)))  # as it is chosen when it is pressed
         self.refresh()
 
     def refresh(self, newest: bool = True) -> None:
@@ -123,12 +120,6 @@ class SessionControls:
         said = "; ".join(f"{title}: {line[:1].lower()}{line[1:].rstrip('.')}" for title, line in lines.items())
         self._page.notify("Session loaded", f"{path.name}. {said}" if said else path.name, "green")
 
-    def _post(self, kind: str, job: Callable[[], None]) -> None:
-        def checked() -> None:
-            self._page.checked(job, self._save_it)
-
-        self._files.post(kind, checked)
-
 
 # --- the Runs tab's panel on the right: the Rerun viewer in the page, and two recordings on the same axes -------------
 
@@ -169,8 +160,8 @@ class RunsResult:
             self._place = gui.add_folder("Signals and search", visible=False)
             self._table = add_html(gui)
         page.measuring.add_rows(self._glance, 2, self._glance_lines, self._zoom_glance)
-        self._close.on_click(lambda _: page.screen.post("viewer", self.close_viewer))
-        self._signal.on_update(lambda event: event.client and page.screen.post("two", self._draw))
+        page.pressed(self._close, self.close_viewer)
+        page.changed(self._signal, self._draw)
 
     def set_dark(self, dark: bool) -> None:
         """The page is dark from now on, or light; a viewer that is open is loaded anew."""
@@ -312,12 +303,12 @@ class RunsPanel:
         with gui.add_folder("All, newest first"):
             self._list = add_html(gui)
             again = gui.add_button("Refresh the list", icon=viser.Icon.REFRESH, color="gray")
-        self._choice.on_update(lambda event: event.client and self._post(self._take_choice))
-        self._open.on_click(lambda _: self._post(self._open_chosen, self._open))
-        self._compare.on_click(lambda _: self._post(self._compare_two, self._compare))
-        self._rename.on_click(lambda _: self._post(self._rename_chosen, self._rename))
-        self._delete.on_click(lambda event: event.client and self._ask(event.client))
-        again.on_click(lambda _: self._post(self.refresh))
+        page.changed_to(self._choice, self._take_choice, on=files)  # the list may be about to be read again
+        page.pressed(self._open, self._open_chosen, on=files)
+        page.pressed(self._compare, self._compare_two, on=files)
+        page.pressed(self._rename, self._rename_chosen, on=files)
+        page.pressed_by(self._delete, self._ask)
+        page.pressed(again, partial(page.checked, self.refresh, self._choice), on=files)
         page.session.identifying.identified.connect(lambda _: self.refresh_soon())
         page.workspaces.entered.connect(lambda name: name == WORKSPACE.name and self.refresh_soon())
         threading.Thread(target=self._watch, name="emaviz-runs", daemon=True).start()
@@ -375,8 +366,10 @@ class RunsPanel:
         self._list.content = _listed(entries) + more
         self._show_chosen()
 
-    def _take_choice(self) -> None:
+    def _take_choice(self, name: str) -> None:
         self._by_hand = True
+        if name in self._choice.options:
+            self._choice.value = name
         self._show_chosen()
 
     def _offer_others(self) -> None:
@@ -450,7 +443,9 @@ class RunsPanel:
         self._choice.value, self._by_hand = new, True
         self.refresh()
 
-    def _ask(self, client: viser.ClientHandle) -> None:
+    def _ask(self, client: viser.ClientHandle | None) -> None:
+        if client is None:
+            return
         name = str(self._choice.value)
         modal = client.gui.add_modal("Delete this run?")
         with modal:
@@ -471,11 +466,7 @@ class RunsPanel:
 
     def _post(self, job: Callable[[], None], control: Any = None) -> None:
         """On the files' thread; what is refused stands beside the control."""
-
-        def checked() -> None:
-            self._page.checked(job, control or self._choice)
-
-        self._files.post(job.__qualname__, checked)
+        self._files.post(job.__qualname__, lambda: self._page.checked(job, control or self._choice))
 
 
 def _card(entry: Entry) -> Html:
@@ -555,7 +546,7 @@ class RunsTab(Tab):
     def __init__(self, shared: Shared, right: viser.PanelHandle) -> None:
         super().__init__(shared, right)
         self.result = RunsResult(self.page, right)
-        shared.strip.themed.connect(lambda dark: self.page.screen.post("viewer", lambda: self.result.set_dark(dark)))
+        self.page.screen.hear(shared.strip.themed, self.result.set_dark)
 
     def build(self) -> None:
         """The recordings, sessions and campaigns."""

@@ -95,13 +95,14 @@ class Correction:
         self._page, self._discovering = page, discovering
         self._lines: list[tuple[str, HtmlPiece]] = []  # each with the workspace that it stands in
         self._ways: dict[int, str] = {}  # what a click on a step runs, where that is not the way to its workspace
-        comparing = discovering.comparing
-        for happens in (
-            *(comparing.events.opened, comparing.events.removed, comparing.events.held, comparing.events.compared),
-            *(comparing.job.began, comparing.job.ended, discovering.events.looked),
-            *(discovering.job.began, discovering.job.ended),
-        ):
-            happens.connect(lambda *_: page.screen.post("correction", self.refresh))
+        events, jobs = discovering.comparing.events, (discovering.comparing.job, discovering.job)
+        page.screen.hear_any(
+            [
+                *(events.opened, events.removed, events.held, events.compared, discovering.events.looked),
+                *(happens for job in jobs for happens in (job.began, job.ended)),
+            ],
+            self.refresh,
+        )
 
     def add(self, workspace: str) -> None:
         """Here, at the top of a tab."""

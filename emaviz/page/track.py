@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 from typing import Any
 
 import plotly.graph_objects as go
@@ -35,7 +36,6 @@ from emaviz.page.style import LONG_LABELS, unseen_field
 from emaviz.page.tab import Shared, Standing, Tab
 from emaviz.page.window_layout import COLUMNS, NEXT_COLUMN
 from emaviz.page.workspaces import Page, Workspace
-from emaviz.recording.viewer import ViewerHost
 from emaviz.server.viser_private import Inside, id_of
 from emaviz.session.compare import Comparing
 from emaviz.session.jobs import Worker
@@ -87,21 +87,6 @@ class FlightClicks:
         field.on_update(told)
         script = _SCRIPT.replace("FIELD", json.dumps(id_of(field))).replace("CHART", json.dumps(CLICKED))
         Inside(page.server).run(script.replace("BETWEEN", _BETWEEN))
-
-
-# --- what stays of followed flights: the report, which the browser also saves, and the recording for Rerun ------------
-
-
-class TrackKeep(KeepButtons):
-    """Two buttons, and what they have written."""
-
-    def __init__(self, page: Page, following: Following, viewer: ViewerHost | None) -> None:
-        def save(suffix: str, button: Any) -> None:
-            page.ask(f"track {suffix}", lambda: following.save(suffix), button)
-
-        super().__init__(
-            page, "track", following.folder, viewer, following.events.kept, save, following.provenance, REPORT, RECORD
-        )
 
 
 # --- from a flight to its comparison: the same recording, alone, on Compare -------------------------------------------
@@ -201,8 +186,8 @@ class TrackResult:
         self._save = gui.add_folder("Keep it", visible=False)
         with self._save:
             self._kept = keep()
-        self._today.on_update(lambda event: event.client and slow.post("today", self._draw))
-        self._fault.on_update(lambda event: event.client and self._choose())
+        page.changed(self._today, self._draw, on=slow)
+        page.changed(self._fault, self._choose, at_once=True)
 
     def busy(self, busy: bool) -> None:
         """Whether a run goes on: where no flight is shown yet, it is said that it does."""
@@ -355,7 +340,7 @@ class TrackPanel:
         self._page, self._following, self._result = page, following, result
         self._example_asked = False
         result.run_example = self._run_example
-        gui, post = page.server.gui, page.screen.post
+        gui, screen, job, events = page.server.gui, page.screen, following.job, following.events
         add_html(gui, note(_ABOUT))
         hint = "Folders of the data folder that hold recordings"
         self._folder = FolderChoice(page, "Flights", hint, self._listed, lambda: following.chosen, self._take_folder)
@@ -368,24 +353,23 @@ class TrackPanel:
             self._threshold = gui.add_number("Threshold", 0.5, min=0.0, max=1.0, step=0.001, disabled=True)
             self._all = add_html(gui)
         self._start = gui.add_button("Track", icon=viser.Icon.TIMELINE, disabled=True)
-        self._line = JobLine(page, following.job, WORKSPACE, pauses="it")
-        self._watch = gui.add_checkbox(
-            "Add new flights",
-            following.watching,
-            hint="Files that arrive in the folder add a point each",
+        self._line = JobLine(page, job, WORKSPACE, pauses="it")
+        watch = gui.add_checkbox(
+            "Add new flights", following.watching, hint="Files that arrive in the folder add a point each"
         )
         self._left_out = add_html(gui)
-        self._fault.on_update(lambda event: event.client and post("fault", self._show_fault))
+        page.changed(self._fault, self._show_fault)
         for control in (self._ends, self._threshold):
-            control.on_update(lambda event: event.client and self._ask_threshold())
-        self._watch.on_update(lambda event: event.client and self._take_watch())
-        self._start.on_click(lambda _: post("track", self._begin))
+            page.changed(control, self._ask_threshold, at_once=True)
+        page.bind(watch, lambda: following.watching, partial(setattr, following, "watching"))
+        page.pressed(self._start, self._begin)
+        page.disable_while(job, self._folder.control, self._fault, self._ends)
         standing.connect(self._start, self._forget_errors)
-        following.job.began.connect(lambda _: post("track began", lambda: self._busy(True)))
-        following.job.ended.connect(lambda _: post("track ended", lambda: self._busy(False)))
-        following.events.followed.connect(lambda history: post("followed", lambda: result.show(history)))
-        following.events.began.connect(lambda *first: post("followed", lambda: result.show_first(*first)))
-        following.events.left_out.connect(lambda: post("left out", self._show_left_out))
+        screen.hear(job.began, lambda _: self._practice.fold())
+        screen.follow(job, self._busy)
+        screen.hear(events.followed, result.show, kind=self)
+        screen.hear(events.began, result.show_first, kind=self)
+        screen.hear(events.left_out, self._show_left_out)
         self.refresh()
 
     def refresh(self) -> None:
@@ -472,9 +456,6 @@ class TrackPanel:
         ]
         self._all.content = boxed(joined(told, "<br>")) if told else ""
 
-    def _take_watch(self) -> None:
-        self._following.watching = bool(self._watch.value)
-
     # --- the run ----------------------------------------------------------------------------------------------------
 
     def _begin(self) -> None:
@@ -489,13 +470,7 @@ class TrackPanel:
 
     def _busy(self, busy: bool) -> None:
         self._result.busy(busy)
-        if busy:
-            self._practice.fold()
-        with self._page.server.atomic():
-            self._start.disabled = busy
-            for control in (self._folder.control, self._fault, self._ends):
-                control.disabled = busy
-            self._threshold.disabled = busy or not self._ends.value
+        self._threshold.disabled = busy or not self._ends.value
         self._show_left_out()
         self.refresh()
 
@@ -525,7 +500,16 @@ class TrackTab(Tab):
                 shared.slow_screen,
                 lambda chosen: FlightLead(self.page, shared.comparing, self.following, chosen),
                 lambda: Seal(self.page, following.practice, lambda: following.chosen, lambda: following.last),
-                lambda: TrackKeep(self.page, self.following, shared.viewer),
+                lambda: KeepButtons(
+                    self.page,
+                    following.folder,
+                    shared.viewer,
+                    following.events.kept,
+                    lambda suffix, _: following.save(suffix),
+                    following.provenance,
+                    REPORT,
+                    RECORD,
+                ),
             )
 
     def build(self) -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import threading
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Hashable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -289,6 +289,20 @@ class Workspaces:
 
 # --- what panels share: the server, the session, the screen's thread, the workspaces, and messages to the user --------
 
+_CHOICES = viser.GuiDropdownHandle, viser.GuiCheckboxHandle  # in which nothing is typed that is to be corrected
+
+
+@dataclass(frozen=True)
+class Bound:
+    """A control, and what the session holds for it."""
+
+    control: Any
+    get: Callable[[], Any]
+
+    def show(self) -> None:
+        """Sets the control to what the session holds."""
+        self.control.value = self.get()
+
 
 @dataclass(frozen=True)
 class Page:
@@ -319,13 +333,13 @@ class Page:
 
         control: beside which that stands until it is changed; a message that goes away is for what has no place.
         """
+        if control is not None:
+            self.say_beside(control, "")  # before: the change itself may say something there
         try:
             change()
         except InputError as error:
             self._refuse(error, control)
             return False
-        if control is not None:
-            self.say_beside(control, "")
         return True
 
     def _refuse(self, error: InputError, control: Any) -> None:
@@ -334,13 +348,82 @@ class Page:
         else:
             self.say_beside(control, str(error))
 
-    def ask(self, kind: str, asked: Callable[[], Any], control: Any = None) -> None:
+    def ask(self, kind: Hashable, asked: Callable[[], Any], control: Any = None) -> None:
         """Does what was asked soon, on the screen's thread; what is refused stands beside the control that asked."""
+        self.screen.post(kind, lambda: self.checked(asked, control))
 
-        def checked() -> None:
-            self.checked(asked, control)
+    # --- what a person does with a control --------------------------------------------------------------------------
+    # It is answered on the screen's thread, or on another one; an answer that still waits gives way to a later one of
+    # the same control.  An InputError is told beside the control, until that is used again.
 
-        self.screen.post(kind, checked)
+    def pressed(self, button: Any, act: Callable[[], object], on: Worker | None = None) -> None:
+        """Calls act when a button is pressed."""
+        self.pressed_by(button, lambda _: act(), on)
+
+    def pressed_by(
+        self, button: Any, act: Callable[[viser.ClientHandle | None], object], on: Worker | None = None
+    ) -> None:
+        """Calls act with the window in which a button is pressed."""
+
+        def pressed(event: viser.GuiEvent[Any]) -> None:
+            (on or self.screen).post(id_of(button), lambda: self.checked(lambda: act(event.client), button))
+
+        button.on_click(pressed)
+
+    def changed(
+        self, control: Any, act: Callable[[], object], on: Worker | None = None, *, at_once: bool = False
+    ) -> None:
+        """Calls act when a person changes a control, not when the program does.
+
+        at_once: on the server's thread, without waiting for what is drawn, as for a slider that is dragged.
+        """
+        self.changed_to(control, lambda _: act(), on, at_once=at_once)
+
+    def changed_to(
+        self, control: Any, act: Callable[[Any], object], on: Worker | None = None, *, at_once: bool = False
+    ) -> None:
+        """The same with the value that the person gave, even where the program has set another one since."""
+
+        def changed(event: viser.GuiEvent[Any]) -> None:
+            if event.client is None:
+                return
+            value = control.value
+            if at_once:
+                self.checked(lambda: act(value), control)
+            else:
+                (on or self.screen).post(id_of(control), lambda: self.checked(lambda: act(value), control))
+
+        control.on_update(changed)
+
+    def bind(
+        self, control: Any, get: Callable[[], Any], take: Callable[[Any], object], *, at_once: bool = False
+    ) -> Bound:
+        """A control of what the session holds: get() is that, take(value) what a person chooses or types instead.
+
+        Of a value that take refuses, a choice is taken back, while a text or a number stays to be corrected.
+        """
+        bound = Bound(control, get)
+
+        def change() -> None:
+            try:
+                take(control.value)
+            except InputError:
+                if isinstance(control, _CHOICES):
+                    bound.show()
+                raise
+
+        self.changed(control, change, at_once=at_once)
+        return bound
+
+    def disable_while(self, job: Job, *controls: Any) -> None:
+        """Controls cannot be used while a job runs."""
+
+        def show(running: bool) -> None:
+            with self.server.atomic():
+                for control in controls:
+                    control.disabled = running
+
+        self.screen.follow(job, show)
 
     def say_beside(self, control: Any, text: str, *, calm: bool = False) -> None:
         """Stands below a control until it is used again; no text takes it away.  calm: it is no error."""

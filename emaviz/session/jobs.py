@@ -9,7 +9,7 @@ import re
 import threading
 import time
 import traceback
-from collections.abc import Callable, Generator
+from collections.abc import Callable, Generator, Hashable, Iterable
 from dataclasses import dataclass, field
 from typing import Generic, ParamSpec, Protocol, TypeVar
 
@@ -45,7 +45,7 @@ class Signal(Generic[Values]):
 # one of its kind that has not begun — the latest value wins —, and goes before the next step of the long
 # job (an identification), of which there is one at most and which can be stopped between two steps.
 
-Call = Callable[[], None]
+Call = Callable[[], object]
 Steps = Generator[None, None, None]
 Done = TypeVar("Done")
 
@@ -104,10 +104,10 @@ class Worker:
     def __init__(self, name: str, on_error: Callable[[BaseException], None], rest_s: float = 0.0) -> None:
         self._on_error = on_error
         self._rest_s = rest_s
-        self._last: dict[str, float] = {}
+        self._last: dict[Hashable, float] = {}
         self._attended = -math.inf  # when the last quick job ended
         self._wake = threading.Condition()
-        self._quick: dict[str, Call] = {}
+        self._quick: dict[Hashable, Call] = {}
         self._long: Steps | None = None
         self._end: Call | None = None  # tells that the long job is over
         self._title = ""  # of the long job that was begun last
@@ -117,11 +117,40 @@ class Worker:
         self._thread = threading.Thread(target=self._run, name=name, daemon=True)
         self._thread.start()
 
-    def post(self, kind: str, job: Call) -> None:
+    def post(self, kind: Hashable, job: Call) -> None:
         """Runs a job soon; a job of the same kind that still waits is dropped."""
         with self._wake:
             self._quick[kind] = job  # keeps its place in the line
             self._wake.notify()
+
+    def hear(
+        self,
+        signal: Signal[Values],
+        act: Callable[Values, object],
+        *,
+        kind: Hashable = None,
+        each: Callable[Values, Hashable] | None = None,
+    ) -> None:
+        """Calls act here with the values of a signal; values that still wait give way to later ones.
+
+        kind: for signals of which only the latest counts, whichever that is.  each(): what the values are about;
+        they give way only to others about the same.
+        """
+
+        def tell(*values: Values.args, **named: Values.kwargs) -> None:
+            own = kind or tell
+            self.post(own if each is None else (own, each(*values, **named)), lambda: act(*values, **named))
+
+        signal.connect(tell)
+
+    def hear_any(self, signals: Iterable[Signal[...]], act: Call) -> None:
+        """Calls act here, once, after one or several of the signals."""
+        for signal in signals:
+            signal.connect(lambda *_: self.post(act, act))
+
+    def follow(self, job: Job, act: Callable[[bool], object]) -> None:
+        """Calls act here with whether a job runs, each time that it begins or ends."""
+        self.hear_any((job.began, job.ended), lambda: act(job.running))
 
     def start(self, steps: Steps, title: str = "", taken: Call = lambda: None) -> bool:
         """Begins a long job, a step at a time; False, and nothing is begun, while another one runs.

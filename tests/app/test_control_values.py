@@ -1,17 +1,22 @@
-"""No value reaches viser's store that its control does not take; what is refused is sent back."""
+"""No value reaches viser's store that its control does not take; what is refused is sent back.  What a control sets."""
 
 from __future__ import annotations
 
 import math
+import threading
 from itertools import count
+from types import SimpleNamespace
 
 import pytest
 import viser
 from support.on_page import wait_until
 from support.raw_page import RawPage
 
+from ema_model.errors import InputError
+from emaviz.page.workspaces import Page
 from emaviz.server.access import LONGEST_TEXT, MOST_INT
 from emaviz.server.safe_server import open_server
+from emaviz.session.jobs import Job, Worker
 
 # Refused by every control.  3000 digits come as text or as an extension: msgpack's own integers end at 2⁶⁴.
 NEVER = [
@@ -232,3 +237,119 @@ def test_a_control_of_one_page_is_checked_too(server, controls, raw):
     assert own.value == 3
     raw.update(uuid(own), 4)
     wait_until(lambda: own.value == 4, 10.0)
+
+
+# --- what a control sets in the session -------------------------------------------------------------------------------
+
+
+@pytest.fixture
+def screen():
+    worker = Worker("test-screen", lambda error: pytest.fail(repr(error)))
+    yield worker
+    worker.close()
+
+
+@pytest.fixture
+def page(server, screen):
+    return Page(server, None, screen, None, None)
+
+
+@pytest.fixture
+def held(screen):
+    """The screen's thread is kept from its work until this is called."""
+    go = threading.Event()
+    screen.post("held", lambda: go.wait(10.0))
+    yield go.set
+    go.set()
+
+
+@pytest.fixture
+def session():
+    """Takes what is short, and remembers on which threads."""
+    session = SimpleNamespace(value="a", taken=[], threads=set())
+
+    def take(value):
+        session.threads.add(threading.current_thread().name)
+        if len(str(value)) > 1:
+            raise InputError("it is too long")
+        session.taken.append(value)
+        session.value = value
+
+    session.take = take
+    return session
+
+
+def test_a_bound_control_sets_what_a_person_chooses(server, controls, raw, page, session):
+    choice = server.gui.add_dropdown("bound", ("a", "b", "long"))
+    bound = page.bind(choice, lambda: session.value, session.take)
+    raw.update(uuid(choice), "b")
+    wait_until(lambda: session.taken == ["b"], 10.0)
+    assert session.threads == {"test-screen"}
+    session.value = "a"
+    bound.show()
+    heard(raw, controls)
+    assert choice.value == "a" and session.taken == ["b"], "the program's own value is not taken"
+
+
+def test_a_refused_choice_is_taken_back_and_a_refused_text_stays(server, controls, raw, page, session):
+    choice, text = server.gui.add_dropdown("chosen", ("a", "b", "long")), server.gui.add_text("typed", "a")
+    for control in (choice, text):
+        page.bind(control, lambda: session.value, session.take)
+    raw.update(uuid(choice), "long")
+    wait_until(lambda: raw.values.get(uuid(choice)) == "a" and choice.value == "a", 10.0)
+    raw.update(uuid(text), "long")
+    wait_until(lambda: page._refused == {uuid(choice), uuid(text)}, 10.0)
+    assert text.value == "long" and not session.taken
+    raw.update(uuid(choice), "b")
+    raw.update(uuid(text), "c")
+    wait_until(lambda: session.taken == ["b", "c"], 10.0)
+    assert not page._refused, "what was said goes with the next value"
+
+
+def test_the_latest_change_counts(server, controls, raw, page, session, held):
+    text, choice = server.gui.add_text("later", ""), server.gui.add_dropdown("later too", ("a", "b", "c"))
+    page.bind(text, lambda: session.value, session.take)
+    chosen = []
+    page.changed_to(choice, chosen.append)
+    for value in ("b", "c"):
+        raw.update(uuid(text), value)
+        raw.update(uuid(choice), value)
+    heard(raw, controls)
+    choice.value = "a"  # the program's: the person's is taken all the same
+    held()
+    wait_until(lambda: session.taken and chosen, 10.0)
+    assert (session.taken, chosen) == (["c"], ["c"])
+
+
+def test_at_once_waits_for_nothing_that_is_drawn(server, raw, page, session, held):
+    slider = server.gui.add_slider("dragged", 0, 9, 1, 0)
+    page.bind(slider, lambda: session.value, session.take, at_once=True)
+    raw.update(uuid(slider), 7)
+    wait_until(lambda: session.taken == [7], 10.0)
+
+
+def test_a_press_is_answered_on_its_thread_with_its_window(server, raw, page, session):
+    button, other = server.gui.add_button("pressed"), server.gui.add_button("pressed by")
+    slow, windows = Worker("test-slow", lambda error: pytest.fail(repr(error))), []
+    page.pressed(button, lambda: session.take("long"), on=slow)
+    page.pressed_by(other, windows.append)
+    raw.update(uuid(button), True)
+    raw.update(uuid(other), True)
+    wait_until(lambda: windows and page._refused == {uuid(button)}, 10.0)
+    assert session.threads == {"test-slow"} and windows[0] in server.get_clients().values()
+    slow.close()
+
+
+def test_controls_are_disabled_while_a_job_runs(server, page, screen):
+    box, go = server.gui.add_checkbox("waits", False), threading.Event()
+    job = Job(screen)
+    page.disable_while(job, box)
+
+    def work(_):
+        while not go.is_set():
+            yield
+
+    assert job.begin("Working", work)
+    wait_until(lambda: box.disabled, 10.0)
+    go.set()
+    wait_until(lambda: not box.disabled and not job.running, 10.0)

@@ -6,7 +6,7 @@ import itertools
 import threading
 import time
 
-from emaviz.session.jobs import Worker
+from emaviz.session.jobs import Signal, Worker
 
 
 def wait_until(condition, seconds=5.0):
@@ -43,6 +43,27 @@ def test_the_latest_value_wins(worker):
     wait_until(lambda: seen)
     time.sleep(0.02)
     assert seen == [99]
+
+
+def test_of_what_a_signal_tells_the_latest_is_heard(worker):
+    gate, seen = threading.Event(), []
+    worker.post("gate", lambda: gate.wait(5.0))
+    time.sleep(0.02)
+    told, begun, ended = Signal(), Signal(), Signal()
+    worker.hear(told, lambda name, number: seen.append((name, number)), each=lambda name, number: name)
+    for signal, word in ((begun, "begun"), (ended, "ended")):
+        worker.hear(signal, lambda word=word: seen.append(word), kind="run")
+    for word in ("first", "second"):
+        worker.hear_any((begun,), lambda word=word: seen.append(word))
+    for number in range(3):
+        for name in ("a", "b"):
+            told(name, number)
+    begun()
+    ended()
+    gate.set()
+    wait_until(lambda: len(seen) == 5)
+    time.sleep(0.02)
+    assert seen == [("a", 2), ("b", 2), "ended", "first", "second"]
 
 
 def test_a_second_long_job_is_refused_until_the_first_ends(worker):

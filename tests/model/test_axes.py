@@ -65,6 +65,7 @@ AT_MOTOR = {
     "effects.encoder_eccentricity.amplitude_rad": "angle",
     "effects.presliding_friction.stiffness_Nm_rad": "stiffness",
     "effects.presliding_friction.damping_Nms_rad": "damping",
+    "effects.power_law_drag.speed_rad_s": "speed",
     "effects.quadratic_drag.speed_rad_s": "speed",
     "effects.screw_lead_error.period_rad": "angle",
     "effects.stribeck_friction.speed_rad_s": "speed",

@@ -195,6 +195,18 @@ def test_drag_grows_with_the_square_of_speed():
     assert drag(600.0) == pytest.approx(4.0 * drag(300.0)) and drag(800.0, np.inf) == 0.0
 
 
+def test_drag_of_a_film_grows_with_its_power_of_speed():
+    """To the dry friction at ω_p, whatever the direction; four times the speed takes twice the torque where p = 1/2."""
+    law = CATALOGUE["power_law_drag"].places[0]
+
+    def drag(omega, speed=400.0, exponent=0.5):
+        return law(0.05, 0.1, omega, 0.0, 0.0, 0.0, 0.0, GEAR, 0.0, 0.0, 0.0, speed, exponent) - 0.05
+
+    assert drag(400.0) == drag(-400.0) == pytest.approx(0.05) and drag(0.0) == 0.0
+    assert drag(400.0) == pytest.approx(2.0 * drag(100.0)) and drag(800.0, np.inf) == 0.0
+    assert drag(800.0, exponent=2.0 / 3.0) == pytest.approx(0.05 * 2.0 ** (2.0 / 3.0))
+
+
 @pytest.mark.parametrize("direction", [1.0, -1.0])
 def test_mesh_friction_is_of_what_the_motors_own_friction_leaves(direction):
     """It grows with J dω/dt + τ T_load alike whether the motor drives or brakes it; turning steadily adds nothing."""

@@ -118,6 +118,7 @@ def test_saturation_is_named_from_torque_against_current(tmp_path):
     [
         (lambda speed: 0.02 * np.exp(-((speed / 12.0) ** 2)), "stribeck_friction", "speed_rad_s", 12.0),
         (lambda speed: 0.05 * speed / (speed + 50.0), "saturating_friction", "half_speed_rad_s", 50.0),
+        (lambda speed: 0.004 * np.sqrt(speed), "power_law_drag", "exponent", 0.5),
     ],
 )
 def test_a_bent_friction_curve_is_named_from_current_against_speed(tmp_path, law, name, parameter, true):

@@ -80,9 +80,15 @@ class Round:
         return Contender(trial, after.log - self.before.log + share, fitted, after.density + after.unseen)
 
     def probabilities(self, contenders: Sequence[Contender] = (), ruled_out: Collection[str] = ()) -> dict[str, float]:
-        """How probable each candidate is, of all and none: of what was refitted by that, of the others by algebra."""
+        """How probable each candidate is, of all and none.
+
+        Of what was refitted by that; of the others by algebra, as far as it kept its promise of any that was.
+        """
         gains = {one.candidate.name: one.gain for one in self.best}
-        gains |= {one.trial.candidate.name: one.gain for one in contenders}
+        refitted = {one.trial.candidate.name: one.gain for one in contenders}
+        kept = [gain / gains[name] for name, gain in refitted.items() if gains.get(name, 0.0) > 0.0]
+        trust = min(1.0, max(kept)) if kept and max(kept) > 0.0 else 1.0
+        gains = {name: min(gain, trust * gain) for name, gain in gains.items()} | refitted
         odds = {name: gain + self.prior for name, gain in gains.items() if name not in ruled_out}
         whole = float(np.logaddexp.reduce([0.0, *odds.values()]))
         return {name: math.exp(one - whole) for name, one in odds.items()}

@@ -268,7 +268,7 @@ class Search:
                 tried = {one.trial.candidate.name for one in found}
                 terms = () if trial.faults else find(trial.candidate.name).terms
                 found += self._refits([one for one in room if one.candidate.name in {*terms} - tried])
-                if self._is_near() and not trial.faults:
+                if not trial.faults and (self._is_near() or within_band(story.data, trial.fit)):
                     found = _best_of_each([*found, *self._laws_instead(leading, room)])
             self._refitted = seen, sorted(found, key=lambda one: -one.gain)
         return self._refitted[1]
@@ -288,25 +288,30 @@ class Search:
     def _laws_instead(self, first: Contender, room: Sequence[ScoredTerm]) -> list[Contender]:
         """Other laws of the same place or speed, each fitted from where that one ended.
 
-        What a true model may leave has a shape of its own, that one of two wrong laws may meet better.
+        Beside a model that is far off, two curves of one speed look less alike than they are.  What a true model may
+        leave has a shape of its own, that one of two wrong laws may meet better: there all are asked.
         """
         seen, found, name = self._round(), first.trial.fit, first.trial.candidate.name
         (key,) = first.trial.effects
-        about = AboutFit.of(found, seen.noise).without(places_of(found, key))
+        whole = AboutFit.of(found, seen.noise)
+        about = whole.without(places_of(found, key))
         own = evidence_of(seen.noise, about.residual, about.unknowns)
+        told = evidence_of(seen.noise, whole.residual, whole.unknowns).log - own.log
         start = {path: x for path, x in found.starts.items() if not path.startswith(f"effects.{key}.")}
-
-        def there(one: ScoredTerm) -> ScoredTerm:
+        instead: list[ScoredTerm] = []
+        for one in (one for one in room if _is_of_one_law(one.candidate.name, name)):
             term = one.term
-            whole = evidence_of(seen.noise, about.residual, about.unknowns.beside([term.unknowns]), own.levels)
-            candidate = term.candidate(whole.amounts[-len(term.unknowns.mean) :], found)
-            return replace(one, candidate=candidate, start=start)
+            other = evidence_of(seen.noise, about.residual, about.unknowns.beside([term.unknowns]), own.levels)
+            if self._is_near() or other.log + term.log_share - own.log > MIGHT * told:
+                candidate = term.candidate(other.amounts[-len(term.unknowns.mean) :], found)
+                instead.append(replace(one, candidate=candidate, start=start))
+        return self._refits(instead, to_the_end=True)
 
-        return self._refits([there(one) for one in room if _is_of_one_law(one.candidate.name, name)])
-
-    def _refits(self, chosen: Sequence[ScoredTerm]) -> list[Contender]:
+    def _refits(self, chosen: Sequence[ScoredTerm], to_the_end: bool = False) -> list[Contender]:
         """Terms in the last model, each refitted."""
         story, trials = self.story, fits(self._refit, chosen, self._tell)
+        if to_the_end:
+            trials = [self._ended(one, self._tell) for one in trials]
         seen = self._round()
         return [seen.contender(story.data, story.held, one, trial) for one, trial in zip(chosen, trials)]
 
@@ -324,8 +329,12 @@ class Search:
         trial = refitted(story.data, story.current, one.candidate, one.start, tell, key=one.term.name)
         if not self._is_far() or trial.drop < TOLD_WELL * story.current.chi2:
             return trial
-        ended = fitted_to_the_end(story.data, trial.fit, True, tell)
-        return replace(trial, fit=ended, drop=story.current.chi2 - ended.chi2)
+        return self._ended(trial, tell)
+
+    def _ended(self, trial: Trial, tell: Progress) -> Trial:
+        """A trial, fitted to its end."""
+        ended = fitted_to_the_end(self.story.data, trial.fit, True, tell)
+        return replace(trial, fit=ended, drop=self.story.current.chi2 - ended.chi2)
 
     # --- one step -----------------------------------------------------------------------------------------------------
 
@@ -541,7 +550,7 @@ class Search:
         story, seen = self.story, self._round()
         effects = story.current.calibration.actuator.effects
         orders = [effects[one.key]["order"] for one in story.added if "order" in effects[one.key]]
-        if not story.added or (at_floor(story.data, story.current) and not is_a_shape(orders)):
+        if not story.added or (self._is_near() and not is_a_shape(orders)):
             return
         added = story.steps[story.bare :]
         story.restart()
@@ -602,11 +611,11 @@ class Search:
         trial = refitted(story.data, smaller, candidate, smaller.starts, tell, key=term.name)
         after, before = evidence_of_fit(story.data, story.held, trial.fit, seen.noise), seen.before
         gain = after.log + term.log_share - before.log
-        apart = are_told_apart(gain, after.density + after.unseen - before.density - before.unseen)
+        density = after.density + after.unseen - before.density - before.unseen
         is_its_term = not trial.faults and catalogue_name(key) in find(candidate.name).terms
-        if gain < (NAMED if is_its_term else 0.0):
+        if gain < 0.0 or (is_its_term and not are_told_apart(-gain, -density)):
             if key not in NAMES:
-                story.tie(key, candidate.name, not apart)
+                story.tie(key, candidate.name, not are_told_apart(gain, density))
             return False
         if trial.faults or key in NAMES:
             story.remove(key, smaller)

@@ -368,6 +368,22 @@ def test_an_effect_that_tells_little_beside_what_is_left_is_taken_back(monkeypat
     assert bool(taken) != stays
 
 
+def test_algebra_that_a_refit_did_not_keep_is_no_rival():
+    """A Term whose refit gave a twentieth of what the algebra promised is not less probable for another's promise."""
+    promised = {"stribeck_friction": 2870.0, "friction_zone": 1420.0, "cogging_torque": 318.0}
+    terms = [SimpleNamespace(gain=gain, candidate=SimpleNamespace(name=name)) for name, gain in promised.items()]
+    seen = rounds.Round(None, None, Evident(0.0, 0.0, 0.0), (), terms)
+    made = [
+        SimpleNamespace(gain=gain, trial=SimpleNamespace(candidate=SimpleNamespace(name=name)))
+        for name, gain in (("stribeck_friction", 131.0), ("friction_zone", -2.0))
+    ]
+    assert seen.probabilities(made)["stribeck_friction"] > 0.99
+    assert seen.probabilities(made[:1])["stribeck_friction"] > 0.99
+    assert seen.probabilities()["stribeck_friction"] > 0.99 > seen.probabilities(made)["cogging_torque"]
+    kept = [SimpleNamespace(gain=2900.0, trial=made[1].trial)]  # the zone is more than was promised of it
+    assert seen.probabilities(kept)["friction_zone"] > 0.99 > seen.probabilities(kept)["stribeck_friction"]
+
+
 def test_what_a_richer_law_begins_with_is_refitted_beside_it(monkeypatch):
     """Friction that saturates at once is dry friction, which the algebra may hold for less."""
     gains = {"saturating_friction": 30.0, "dry_friction": 8.0, "cogging_torque": 7.0}
@@ -390,7 +406,7 @@ def test_what_a_richer_law_begins_with_is_refitted_beside_it(monkeypatch):
 
 
 def _trial(one):
-    return SimpleNamespace(candidate=one.candidate, faults=())
+    return SimpleNamespace(candidate=one.candidate, faults=(), fit=None)
 
 
 @pytest.mark.parametrize(("gain", "told", "tied"), [(9.0, 0.99988, False), (1.0, 1.0, True)])

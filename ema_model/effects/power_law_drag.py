@@ -17,7 +17,7 @@ def moving_friction(level, static, omega, motor_torque, drag, active, load, gear
 EFFECT = Effect(
     title="Power-law drag",
     equation="T_f = sgn ω T_d [1 + (|ω|/ω_p)^p]",
-    source="Palmgren, Ball and Roller Bearing Engineering, 1959: rolling bearings, p = 2/3; hydrodynamic films, p = 1/2",
+    source="Palmgren, Ball and Roller Bearing Engineering, 1959: rolling bearings, p = 2/3; in other films p = 1/2",
     explanation=(
         "The faster balls and rollers roll, the thicker the film of oil that they draw in, so that the drag of its "
         "shear grows less than in proportion to speed: with its power of two thirds in a rolling bearing, with its "

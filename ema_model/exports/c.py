@@ -52,6 +52,11 @@ _BINDING = {"or": 1, "and": 2, "==": 3, "!=": 3, "<": 4, "<=": 4, ">": 4, ">=": 
 _SPELT = {"or": "||", "and": "&&"}
 _HIGHEST = 9
 
+_HELPERS = {  # written where they are called, since an unused function is an error under -Werror
+    "larger": "static double larger(double a, double b)\n{\n    return b > a ? b : a;\n}\n",
+    "smaller": "static double smaller(double a, double b)\n{\n    return b < a ? b : a;\n}\n",
+}
+
 
 class _Writer:
     """Writes functions of a program; prefix: of their names."""
@@ -59,6 +64,7 @@ class _Writer:
     def __init__(self, prefix: str) -> None:
         self.prefix = prefix
         self.sizes: set[int] = set()  # of the values that functions return together
+        self.helpers: set[str] = set()  # of _HELPERS, that are called
 
     def function(self, one: Function, name: str = "", linkage: str = "static ") -> str:
         """A whole function, with what it says above it."""
@@ -144,8 +150,10 @@ class _Writer:
             case Operation(operator="not", operands=(operand,)):
                 text, own = f"!{self.text(operand, 8)}", 7
             case Operation(operator="max", operands=(left, right)):
+                self.helpers.add("larger")
                 text, own = f"larger({self.text(left)}, {self.text(right)})", _HIGHEST
             case Operation(operator="min", operands=(left, right)):
+                self.helpers.add("smaller")
                 text, own = f"smaller({self.text(left)}, {self.text(right)})", _HIGHEST
             case Operation(operator="abs", operands=(operand,)):
                 text, own = f"fabs({self.text(operand)})", _HIGHEST
@@ -251,6 +259,7 @@ def source(one: Exported) -> str:
     n, entries = one.name, one.program.entries
     writer = _Writer(n)
     body = "\n".join(writer.function(it) for it in one.program.functions)
+    helpers = "".join(f"{text}\n" for name, text in _HELPERS.items() if name in writer.helpers)
     tuples = "\n".join(f"typedef struct {{ double v[{size}]; }} values{size};" for size in sorted(writer.sizes))
     defaults = "\n".join(f"    {_number(it.value)}, /* {it.name} */" for it in one.parameters)
     command = "command / p->torque_constant" if one.takes_torque else "command"
@@ -272,7 +281,7 @@ const {n}_parameters {n}_defaults = {{
 {defaults}
 }};
 
-{_helpers(body)}{body}
+{helpers}{body}
 void {n}_init({n}_state *s, const {n}_parameters *p, double user_position, double motor_speed, double play)
 {{
     static const {n}_state zero;
@@ -306,15 +315,6 @@ void {n}_step({n}_state *s, const {n}_parameters *p, double command, double load
 }}
 
 {shown}"""
-
-
-def _helpers(body: str) -> str:
-    found = ""
-    if "larger(" in body:
-        found += "static double larger(double a, double b)\n{\n    return b > a ? b : a;\n}\n\n"
-    if "smaller(" in body:
-        found += "static double smaller(double a, double b)\n{\n    return b < a ? b : a;\n}\n\n"
-    return found
 
 
 def _struct(fields: Sequence[Field]) -> str:

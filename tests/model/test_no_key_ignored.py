@@ -140,15 +140,21 @@ PUSHED = [
     one.with_signals(current_A=size * np.sin(2.0 * np.pi * rate * one.time_s))
     for one, size, rate in zip(RECORDINGS, (4.0, 16.0), (15.0, 25.0))
 ]
+# The same by what a voltage drive puts in: volts, and a share of the bus voltage, which alone needs to know it.
+SUPPLIED = [
+    RECORDINGS[0].with_signals(motor_voltage_V=20.0 * np.sin(2.0 * np.pi * 8.0 * RECORDINGS[0].time_s)),
+    RECORDINGS[1].with_signals(duty=0.3 * np.sin(2.0 * np.pi * 15.0 * RECORDINGS[1].time_s)),
+]
 
 
 def said(actuator, circuit: str) -> list[np.ndarray]:
     """All signals of the model that recordings of this actuator are held against, healthy and faulty."""
+    pushed = SUPPLIED if actuator.takes_voltage else PUSHED
     plant: Any = (  # each knows its own windows
         InverseDynamics(RECORDINGS, actuator)
         if actuator.controller.kind == "unknown"
         else ClosedLoop(
-            PUSHED if actuator.controller.kind == "open" else RECORDINGS, actuator, circuit=circuit or "reduced"
+            pushed if actuator.controller.kind == "open" else RECORDINGS, actuator, circuit=circuit or "reduced"
         )
     )
     k = np.stack([HEALTHY, FAULTY])

@@ -126,7 +126,7 @@ def test_hidden_effect_raises_no_alarm_and_is_identified_once_added():
     recording = Sensors(0.1, 12).record(simulate_reference(Run(), ACTUATOR, truth, effect), 4)
     bare = identify(Objective([recording], ACTUATOR), seed=1).uncertainty
     assert not bare.adequate and not bare.healthy and bare.alarms == ()
-    assert "discover" in bare.warnings[0] and "\n" not in bare.warnings[0]
+    assert "Discover, on the same recordings, looks for it" in bare.warnings[0] and "\n" not in bare.warnings[0]
     guessed = with_effect(ACTUATOR, "cogging_torque", {"amplitude_Nm": 0.01, "order": 12.0})
     answer = identify(Objective([recording], guessed), seed=1, truth=truth)
     assert answer.uncertainty.adequate and "k2" in answer.uncertainty.alarms

@@ -203,18 +203,22 @@ def floor(
     place: int,
     k: ArrayLike | None = None,
     stated: Mapping[str, Mapping[str, float]] | None = None,
+    *,
+    whole_noise: bool = False,
 ) -> Floor:
     """The floor of one of a model's windows, by its place.
 
     k: where the twins are run; without it, at the actuator's own.  stated: what is known of the sensors, by signal:
     "noise" (white, rms per sample) in place of the estimate, "accuracy" (slow, rms) besides it.
+    whole_noise: the estimate as it is, without the twins' ripple taken off.
     """
     window, given = model.windows[place], stated or {}
     told = {name: one["noise"] for name, one in given.items() if "noise" in one}
     draws, late = twin_error(model, place, None, k), model.a_sample_late(place, k)
     between = model.between_samples(place, k)
     noise = model.noise(place, told)
-    noise |= {name: _of_sensors(noise[name], draws[name]) for name in draws if name not in told}
+    if not whole_noise:
+        noise |= {name: _of_sensors(noise[name], draws[name]) for name in draws if name not in told}
     slow = {}
     for name in noise:
         lasting = local_rms(draws[name], window.block_s) if draws else np.zeros(window.blocks)

@@ -223,7 +223,7 @@ def test_recordings_are_opened_compared_renamed_and_deleted(watched, app):
     second = identify(session).path
     page.get_by_role("tab", name="Runs").click()
     wait_until(lambda: page.get_by_label("Run", exact=True).input_value() == second.name)
-    assert page.get_by_label("With", exact=True).input_value() == first.name
+    wait_until(lambda: page.get_by_label("With", exact=True).input_value() == first.name)
     page.get_by_label("With", exact=True).click()
     others = page.get_by_role("option").all_inner_texts()
     assert first.name in others and second.name not in others, "nothing is compared with itself"

@@ -260,7 +260,9 @@ def test_edited_physics_is_never_served_from_the_cache(copy):
     first = result(start(program, copy, env))
     file = copy / "ema_model" / "physics" / "elementary.py"
     source = file.read_text(encoding="utf-8")
-    edited = source.replace("return high if raised > high else raised", "return 0.8 * high if raised > high else raised")
+    edited = source.replace(
+        "return high if raised > high else raised", "return 0.8 * high if raised > high else raised"
+    )
     assert edited != source
     file.write_text(edited, encoding="utf-8")
     assert abs(result(start(program, copy, env)) - first) > 1e-6 * first

@@ -29,9 +29,9 @@ threading.Thread(target=ask, daemon=True).start()
 """,
     "compiler": """
 import os
-from ema_model.simulation import compiled
+from ema_model.simulation import pack
 os.cpu_count = lambda: 2
-compiled.compile_ahead([(compiled.find_stack("reduced", ["dead_time"]), "traces")], urgent=False)
+pack.compile_ahead([(pack.find_stack("reduced", ["dead_time"]), "traces")], urgent=False)
 """,
 }
 

@@ -11,19 +11,19 @@ import pytest
 HERE = """
 import sys, time
 from ema_model.actuator import load_actuator
-from ema_model.simulation import compiled
+from ema_model.simulation import pack
 from ema_model.simulation.run import Run, simulate_monitor
 from ema_model.stacks import find_stack
 
 stack = find_stack("reduced", ["dead_time"])
-compiled.compile_ahead([(stack, "traces")])
-[job] = compiled._running
+pack.compile_ahead([(stack, "traces")])
+[job] = pack._running
 assert job.process.wait(120) == 0
 simulate_monitor(Run(duration_s=0.01), load_actuator(), effects={"dead_time": {}}, circuit="reduced")
 statistics = stack.monitor.traces.stats
 assert statistics.cache_hits and not statistics.cache_misses, statistics
-compiled.compile_ahead([(stack, "traces")])
-running = [job for job in compiled._running if job.process.poll() is None]
+pack.compile_ahead([(stack, "traces")])
+running = [job for job in pack._running if job.process.poll() is None]
 assert not running, "what the cache holds is not compiled again"
 """
 

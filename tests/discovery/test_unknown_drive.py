@@ -113,6 +113,7 @@ def test_back_and_forth_a_place_and_a_speed_are_one(tmp_path, hidden, names):
 
 @pytest.mark.long
 @pytest.mark.skipif(not JOINT.is_dir(), reason="the logs of others are not here")
+@pytest.mark.xfail(strict=True, reason="the law alone is told: what was fitted prefers it by e⁴⁹")
 def test_a_robots_joint_names_both(tmp_path):
     """Its place and its speed are one: what was fitted prefers the one law, what was held out the other."""
     drive = em.load_actuator(JOINT / "ur10e_j1.toml")

@@ -104,9 +104,7 @@ def test_a_loop_is_not_walked_on_that_would_be_given_up_at_half_its_error(monkey
 
 
 @pytest.mark.long
-@pytest.mark.xfail(
-    strict=True, reason="told as unknown, 3.3 floors: the filter of the motion bends teeth at this speed"
-)
+@pytest.mark.xfail(strict=True, reason="told as unknown: inverse dynamics leaves 3.3 floors")
 def test_inverse_dynamics_names_what_the_wrong_loop_cannot(cogging):
     found = discover(cogging, OTHER, candidates=FEW)
     assert found.controller_seen is not None

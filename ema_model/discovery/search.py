@@ -233,7 +233,7 @@ class Search:
 
         Where none is far more probable than the model as it is, the search has come to its end.
         """
-        self._going = self._added()
+        self._going = not self._is_lost() and self._added()
 
     # --- what is seen beside the last model ---------------------------------------------------------------------------
 
@@ -540,7 +540,17 @@ class Search:
         self.story.refused[one.name] = reason
         self._barred.add(one.name)
         self._rivals, self._refitted = [], None
-        self.story.back_to_before(one.key)
+        if self._is_lost():
+            self.story.restart()
+        else:
+            self.story.back_to_before(one.key)
+
+    def _is_lost(self) -> bool:
+        """Whether so many effects were added, and spoken against afterwards, that what is missing is none of them.
+
+        Each took what a law that is not there leaves to be taken; the next would, too.
+        """
+        return len(self._barred) > LARGEST_GROUP
 
     def _curve_instead(self) -> None:
         """Takes the residual's own curve in place of all effects, where it is more probable than they are together.

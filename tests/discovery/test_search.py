@@ -368,6 +368,24 @@ def test_an_effect_that_tells_little_beside_what_is_left_is_taken_back(monkeypat
     assert bool(taken) != stays
 
 
+def test_a_search_that_keeps_going_back_ends_with_nothing_added():
+    """Four effects that were added and spoken against afterwards: what is missing is none of them, nor the next."""
+    went: list[str] = []
+    story = SimpleNamespace(
+        refused={}, restart=lambda: went.append("restart"), back_to_before=lambda key: went.append(key)
+    )
+    of = search.Search(story)
+    of._added = lambda: True
+    for name in ("cogging_torque", "dead_time", "constant_load"):
+        of._take_back(SimpleNamespace(name=name, key=name), "one")
+        of.step()
+        assert of._going
+    of._take_back(SimpleNamespace(name="dry_friction", key="dry_friction"), "one")
+    of.step()
+    assert not of._going and went == ["cogging_torque", "dead_time", "constant_load", "restart"]
+    assert len(story.refused) == 4
+
+
 def test_algebra_that_a_refit_did_not_keep_is_no_rival():
     """A Term whose refit gave a twentieth of what the algebra promised is not less probable for another's promise."""
     promised = {"stribeck_friction": 2870.0, "friction_zone": 1420.0, "cogging_torque": 318.0}

@@ -43,7 +43,7 @@ def unit_parameters(result: UnitsCompared, *, dark: bool = False) -> go.Figure:
         horizontal_spacing=0.05,
         vertical_spacing=min(_AXIS_PX / (least_px(result) - _HEAD_PX - _AXIS_PX), 0.9 / max(rows - 1, 1)),
     )
-    like: Any = theme.new("Each unit fitted alone, 90 % intervals", "", "", dark=dark).layout
+    like: Any = theme.new("Parameters of each unit, fitted alone (90 %)", "", "", dark=dark).layout
     grid.update_layout(template=like.template, title=like.title)
     grid.layout.title.text += f'<br><span style="font-size:11px">{_SIGNS}</span>'
     names = [theme.plain(name) for name in result.units]

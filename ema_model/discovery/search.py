@@ -390,9 +390,10 @@ class Search:
         """Laws of the same place or speed that nothing speaks against, where the model leaves no more than a true one.
 
         What a true model may leave has a shape of its own, that one of two wrong laws may meet better: there a law is
-        not told from another by how probable it is.
+        not told from another by how probable it is, where it is more probable than that nothing is missing.
         """
-        laws = [one for one in others if not (one.trial.faults or first.trial.faults)]
+        likely = [one for one in others if one.gain + self._round().prior > 0.0]
+        laws = [one for one in likely if not (one.trial.faults or first.trial.faults)]
         name = first.trial.candidate.name
         return [one for one in laws if _is_of_one_law(one.trial.candidate.name, name) and not self._objection(one)]
 

@@ -601,7 +601,7 @@ def sentences(found: Discovery) -> list[str]:
     added = len(found.effects) + len(causes(found.faults))
     if added:
         told.append(
-            f"With {'it' if added == 1 else 'them'} the error falls from {_times(first, last)}. "
+            f"With {'it' if added == 1 else 'them'} the error falls from {_times(first, last)}."
             + _fall_in_unit(found, first, last)
         )
         told += masked(found.effects, found.actuator.axes)
@@ -747,11 +747,13 @@ def _rms_in_unit(found: Discovery, rung: Rung) -> str:
 
 
 def _fall_in_unit(found: Discovery, first: Rung, last: Rung) -> str:
-    """'The equivalent current's falls from 61.1 to 4.69 mA rms.'"""
+    """' That of the equivalent current falls from 61.1 to 4.69 mA rms.'; "" where its digits do not fall."""
     name = primary(found)
     shown = of_signal(name, found.actuator.axes).scaled([first.signals[name], last.signals[name]])
-    fall = f"from {number(shown.factor * first.signals[name])} to {shown.text(last.signals[name])} rms"
-    return f"That of the {in_sentence(shown.title)} falls {fall}."
+    before, after = (number(shown.factor * rung.signals[name]) for rung in (first, last))
+    if before == after:
+        return ""
+    return f" That of the {in_sentence(shown.title)} falls from {before} to {shown.text(last.signals[name])} rms."
 
 
 def _times(first: Rung, last: Rung) -> str:

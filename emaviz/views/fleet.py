@@ -46,7 +46,7 @@ def unit_parameters(result: UnitsCompared, *, dark: bool = False) -> go.Figure:
     like: Any = theme.new("Parameters of each unit, fitted alone (90 %)", "", "", dark=dark).layout
     grid.update_layout(template=like.template, title=like.title)
     grid.layout.title.text += f'<br><span style="font-size:11px">{_SIGNS}</span>'
-    grid.layout.title.update(y=1.0, yref="container", yanchor="top", pad={"t": 8})  # both lines stand in the figure
+    grid.layout.title.update(y=1.0, yref="container", yanchor="top", pad={"t": 20})  # both lines stand in the figure
     names = [theme.plain(name) for name in result.units]
     for place, path in enumerate(paths):
         where = {"row": place // _COLUMNS + 1, "col": place % _COLUMNS + 1}
